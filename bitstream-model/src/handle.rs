@@ -38,11 +38,11 @@ impl EmulatedBoard {
     /// [`ConfigError`] if a number is outside its range.
     pub fn new(config: BoardConfig) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self::of(config, Memory::new(config.address_width, config.quirks.coherency)))
+        Ok(Self::of(config, Memory::new(config.address_width, config.quirks.coherency), None))
     }
 
-    /// Builds a board on external memory. The device may touch the granted ranges only. Such a
-    /// board allocates no memory itself.
+    /// Builds a board on external memory, around another accelerator if there is one. The device may
+    /// touch the granted ranges only. Such a board allocates no memory itself.
     ///
     /// # Errors
     /// [`ConfigError`] if a number is outside its range.
@@ -50,9 +50,10 @@ impl EmulatedBoard {
         config: BoardConfig,
         memory: Box<dyn DeviceMemory>,
         granted: Vec<Range<u64>>,
+        accelerator: Option<Box<dyn ExternalAccelerator>>,
     ) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self::of(config, Memory::external(memory, granted)))
+        Ok(Self::of(config, Memory::external(memory, granted), accelerator))
     }
 
     /// Builds a board around another accelerator: registers, beats and interrupts are its own. It
@@ -66,12 +67,19 @@ impl EmulatedBoard {
     ) -> Result<Self, ConfigError> {
         config.check()?;
         let memory = Memory::new(config.address_width, config.quirks.coherency);
-        let board = Board::new(config, memory, None, Some(accelerator));
-        Ok(Self(Arc::new(Mutex::new(board))))
+        Ok(Self::of(config, memory, Some(accelerator)))
     }
 
-    fn of(config: BoardConfig, memory: Memory) -> Self {
-        let board = standard(|| Board::new(config, memory, shortcut::of(&config), None));
+    fn of(
+        config: BoardConfig,
+        memory: Memory,
+        accelerator: Option<Box<dyn ExternalAccelerator>>,
+    ) -> Self {
+        let board = standard(|| {
+            // A short cut computes as the model does; another accelerator has to compute itself.
+            let short_cut = if accelerator.is_none() { shortcut::of(&config) } else { None };
+            Board::new(config, memory, short_cut, accelerator)
+        });
         Self(Arc::new(Mutex::new(board)))
     }
 

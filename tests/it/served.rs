@@ -13,6 +13,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::common::{bits, row};
+use bitstream_model::external::{ExternalAccelerator, ModelAccelerator};
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::remote::{
@@ -41,8 +42,14 @@ struct Served {
 
 impl Served {
     fn new(config: BoardConfig) -> Self {
+        Self::with(config, None)
+    }
+
+    fn with(config: BoardConfig, accelerator: Option<Box<dyn ExternalAccelerator>>) -> Self {
         let folder = tempfile::tempdir().expect("a directory");
-        let mut server = bind(config, &folder.path().join("board")).expect("served");
+        let socket = folder.path().join("board");
+        let memory = memory(&socket).expect("memory");
+        let mut server = Server::bind(config, memory, &socket, accelerator).expect("served");
         let (board, stopper) = (server.board().clone(), server.stopper());
         let (sender, visits) = channel();
         let thread = std::thread::spawn(move || {
@@ -84,7 +91,7 @@ fn memory(socket: &Path) -> Result<MemoryFile, MemoryFileError> {
 }
 
 fn bind(config: BoardConfig, socket: &Path) -> Result<Server, ServeError> {
-    Server::bind(config, memory(socket)?, socket)
+    Server::bind(config, memory(socket)?, socket, None)
 }
 
 fn at(socket: &Path) -> OpenOptions {
@@ -143,6 +150,30 @@ fn a_served_board_gives_the_bits_and_the_cycles_of_one_in_this_process() {
         assert!(!served.visit().left_running);
         assert_eq!(served.board.violations(), []);
     }
+}
+
+#[test]
+fn a_served_board_with_another_accelerator_gives_the_same_bits() {
+    let config = BoardConfig::default();
+    let own = Served::new(config);
+    let (expected, reports) = steps(&mut own.open(), 40);
+
+    let model = ModelAccelerator::new(&config).expect("it can be built");
+    let served = Served::with(config, Some(Box::new(model)));
+    let mut there = served.open();
+    let (found, there_reports) = steps(&mut there, 40);
+    assert_eq!(found, expected);
+    // Its clocks come in batches, so that waits differ; its work does not.
+    let fixed = |report: &StepReport| {
+        let StepReport { cycles, register_writes, interrupts, descriptors, .. } = *report;
+        (cycles.work, register_writes, interrupts, descriptors)
+    };
+    for (here, there) in reports.iter().zip(&there_reports) {
+        assert_eq!(fixed(there), fixed(here));
+    }
+    drop(there);
+    assert!(!served.visit().left_running);
+    assert_eq!((served.board.violations(), served.board.accelerator_error()), (vec![], None));
 }
 
 #[test]

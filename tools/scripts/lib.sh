@@ -5,7 +5,7 @@ readonly SKIPPED=77
 
 # A variable that is blank counts as unset, for cargo too.
 for variable in CARGO_TARGET_DIR PGS_VECTORS STEPS QEMU BOOT_LIMIT TEST_LIMIT VALGRIND_LIMIT MIRI_LIMIT \
-	MIRIFLAGS BOARD CHECKS TREE; do
+	MIRIFLAGS BOARD CHECKS TREE SIMULATOR; do
 	[[ ${!variable-set} = *[![:space:]]* ]] || unset "$variable"
 done
 

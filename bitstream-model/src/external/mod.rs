@@ -75,6 +75,22 @@ pub enum ExternalError {
         /// The operating system's reason.
         source: std::io::Error,
     },
+    /// The generator makes no accelerator of the board's profile.
+    #[error("the generated accelerator is of profile {generated}, not {asked}")]
+    Profile {
+        /// The profile of every generated accelerator.
+        generated: &'static str,
+        /// The board's profile.
+        asked: &'static str,
+    },
+    /// It was built for another treatment of hazards.
+    #[error("the simulator is built {simulator}, and the board {board}")]
+    Hazards {
+        /// The simulator's treatment.
+        simulator: &'static str,
+        /// The board's.
+        board: &'static str,
+    },
     /// It has ended, or its pipes are closed.
     #[error("the simulator has ended in the middle of a request ({act})")]
     Ended {

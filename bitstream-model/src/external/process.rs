@@ -27,7 +27,9 @@ use std::thread;
 use std::time::Duration;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
-use pgs_interface::control::{IDENTIFICATION, IDENTIFICATION_VALUE};
+use crate::config::{BoardConfig, Hazards, Subnormals};
+use pgs_interface::control::{FEATURES, IDENTIFICATION, IDENTIFICATION_VALUE, features};
+use pgs_interface::profile::FLOAT;
 use pgs_interface::record::Beat;
 
 pub(super) const STREAMS: usize = 4;
@@ -67,6 +69,32 @@ impl SimulatorProcess {
     /// [`ExternalError`] if the program cannot be started or does not answer as an accelerator.
     pub fn start(path: &Path) -> Result<Self, ExternalError> {
         Self::start_with(path, &[])
+    }
+
+    /// Starts a simulator as the accelerator of a board that is built as `config` says. The board
+    /// treats subnormal numbers as the simulator does.
+    ///
+    /// # Errors
+    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] for
+    /// a simulator that treats hazards in another way; else as for [`start`](Self::start).
+    pub fn start_for(config: &mut BoardConfig, path: &Path) -> Result<Self, ExternalError> {
+        if config.profile != &FLOAT {
+            let (generated, asked) = (FLOAT.name, config.profile.name);
+            return Err(ExternalError::Profile { generated, asked });
+        }
+        let mut simulator = Self::start(path)?;
+        let features = simulator.read(FEATURES.offset)?;
+        let interlocked = features::INTERLOCKED.is_set(features);
+        if interlocked != (config.hazards == Hazards::Interlocked) {
+            let name = |interlocked| if interlocked { "interlocked" } else { "unchecked" };
+            let (simulator, board) = (name(interlocked), name(!interlocked));
+            return Err(ExternalError::Hazards { simulator, board });
+        }
+        config.subnormals = match features::FLUSH_SUBNORMALS.is_set(features) {
+            true => Subnormals::Flush,
+            false => Subnormals::Keep,
+        };
+        Ok(simulator)
     }
 
     /// Starts a simulator with arguments of its own.

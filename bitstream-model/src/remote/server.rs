@@ -19,6 +19,7 @@ use super::memory_file::{MemoryFile, MemoryFileError};
 use super::pending::{Caller, PendingConnections};
 use super::visit::{Ended, Session, Visit};
 use crate::config::{BoardConfig, ConfigError};
+use crate::external::ExternalAccelerator;
 use crate::handle::EmulatedBoard;
 
 /// Time limit for another server at the same socket to accept a connection.
@@ -108,8 +109,8 @@ pub struct Server {
 }
 
 impl Server {
-    /// Builds a board on `memory` and opens the socket. It replaces the socket of a server that was
-    /// killed.
+    /// Builds a board on `memory`, around another accelerator if there is one, and opens the socket.
+    /// It replaces the socket of a server that was killed.
     ///
     /// # Errors
     /// [`ServeError`].
@@ -117,6 +118,7 @@ impl Server {
         config: BoardConfig,
         memory: MemoryFile,
         socket: &Path,
+        accelerator: Option<Box<dyn ExternalAccelerator>>,
     ) -> Result<Self, ServeError> {
         let path = socket.to_owned();
         let failed = |act| {
@@ -141,7 +143,8 @@ impl Server {
         }
         let granted = memory.addresses();
         let identity = (memory.inode(), granted.start);
-        let board = EmulatedBoard::on_memory(config, Box::new(memory), vec![granted])?;
+        let memory = Box::new(memory);
+        let board = EmulatedBoard::on_memory(config, memory, vec![granted], accelerator)?;
         let listener = UnixListener::bind(socket).map_err(failed("opened"))?;
         let same = listener.try_clone().map_err(failed("shared"))?;
         let stopper = Stopper(Arc::new(Stop {

@@ -16,9 +16,7 @@ use std::time::{Duration, Instant};
 
 use bitstream_model::remote::{connect, mark};
 
-use pgs_interface::message::{
-    ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_SUFFIX, Request, Status, VERSION,
-};
+use pgs_interface::message::{ANSWER_BYTES, Answer, MEMORY_SUFFIX, Request, Status, VERSION};
 
 use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
@@ -27,8 +25,12 @@ use crate::platform::{
     DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory,
 };
 
-/// Longest real time for an answer, in which the board's process computes at most [`LONGEST_WAIT`]
-/// of the board's time.
+/// Longest wait of one request, shorter than the protocol allows: a simulator of the accelerator needs
+/// ten seconds for a millisecond of the board's time.
+const ONE_WAIT: Duration = Duration::from_millis(1);
+
+/// Longest real time for an answer, in which the board's process computes at most [`ONE_WAIT`] of
+/// the board's time.
 const ANSWER_LIMIT: Duration = Duration::from_secs(60);
 
 /// Longest real time in which a free board answers the hello of a driver.
@@ -281,7 +283,7 @@ impl Platform for RemotePlatform {
     fn pause(&self, duration: Duration) {
         let mut left = duration;
         while !left.is_zero() {
-            let time = left.min(LONGEST_WAIT);
+            let time = left.min(ONE_WAIT);
             if self.line.ask(Request::Pause { time }).is_err() {
                 let mut state = self.line.state();
                 state.now = state.now.saturating_add(left);
@@ -294,7 +296,7 @@ impl Platform for RemotePlatform {
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
         let mut left = timeout;
         loop {
-            let time = left.min(LONGEST_WAIT);
+            let time = left.min(ONE_WAIT);
             let answer = self.line.ask(Request::WaitInterrupt { time })?;
             left -= time;
             match answer.status {

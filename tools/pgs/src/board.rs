@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use bitstream_model::external::{ExternalAccelerator, LockStep, SimulatorProcess};
+use bitstream_model::external::{ExternalAccelerator, ExternalError, LockStep, SimulatorProcess};
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
-use bitstream_model::interface::profile::{FLOAT, PROFILES, Variant};
+use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
 use zynq_pgs::platform::{System, uio_listing};
@@ -105,30 +105,43 @@ pub(crate) struct ChosenBoard {
     pub(crate) reason: String,
 }
 
+/// Starts the accelerator that was chosen for a board that is built as `config` says, and makes
+/// `config` treat subnormal numbers as it does; none for the built-in model.
+pub(crate) fn external_accelerator(
+    config: &mut BoardConfig,
+    accelerator: &AcceleratorChoice,
+) -> Result<Option<Box<dyn ExternalAccelerator>>, Failure> {
+    let Some((path, with_model)) = accelerator.simulator() else { return Ok(None) };
+    let simulator = SimulatorProcess::start_for(config, path).map_err(|error| {
+        let next = match error {
+            ExternalError::Profile { .. } => "leave out --profile, or --accelerator".to_owned(),
+            ExternalError::Hazards { simulator, .. } => {
+                format!("add --hazards {simulator}, or build the simulator with --hazards")
+            }
+            _ => return Failure::input(error),
+        };
+        Failure::input(error).next(next)
+    })?;
+    Ok(Some(match with_model {
+        true => {
+            let player = Some(path.to_owned());
+            let both = LockStep::new(config, Box::new(simulator), player).map_err(not_built)?;
+            Box::new(both)
+        }
+        false => Box::new(simulator),
+    }))
+}
+
 /// Builds an emulated board with the accelerator that was chosen.
 pub(crate) fn emulated_board(
-    config: BoardConfig,
+    mut config: BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<EmulatedBoard, Failure> {
-    let (path, with_model) = match accelerator {
-        AcceleratorChoice::Model => return EmulatedBoard::new(config).map_err(not_built),
-        AcceleratorChoice::Rtl(path) => (path, false),
-        AcceleratorChoice::Both(path) => (path, true),
-    };
-    if config.profile != &FLOAT {
-        let error = format!(
-            "the generated accelerator is of profile {}, not {}",
-            FLOAT.name, config.profile.name
-        );
-        return Err(Failure::input(error).next("leave out --profile, or --accelerator"));
+    match external_accelerator(&mut config, accelerator)? {
+        Some(external) => EmulatedBoard::with_accelerator(config, external),
+        None => EmulatedBoard::new(config),
     }
-    let mut accelerator: Box<dyn ExternalAccelerator> =
-        Box::new(SimulatorProcess::start(path).map_err(Failure::input)?);
-    if with_model {
-        let both = LockStep::new(&config, accelerator, Some(path.clone())).map_err(not_built)?;
-        accelerator = Box::new(both);
-    }
-    EmulatedBoard::with_accelerator(config, accelerator).map_err(not_built)
+    .map_err(not_built)
 }
 
 /// Chooses a board. `given` is an option of the command line that only an emulated board has.

@@ -90,6 +90,10 @@ fn reads(verb: &Verb) -> Reads {
         board: !matches!(verb, Verb::Model(_) | Verb::Load(_)),
         emulated_memory: matches!(verb, Verb::Serve(_)),
         manager: !matches!(verb, Verb::Model(_)),
+        accelerator: matches!(
+            verb,
+            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_)
+        ),
     }
 }
 

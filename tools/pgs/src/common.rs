@@ -1,7 +1,7 @@
 //! Options of every verb: output, board, DMA memory, FPGA manager.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bitstream_model::interface::address_map::UIO_NODE;
 use clap::Args;
@@ -79,6 +79,17 @@ pub(crate) enum AcceleratorChoice {
     Both(PathBuf),
 }
 
+impl AcceleratorChoice {
+    /// The path of the simulator, and whether the model runs beside it.
+    pub(crate) fn simulator(&self) -> Option<(&Path, bool)> {
+        match self {
+            Self::Model => None,
+            Self::Rtl(path) => Some((path, false)),
+            Self::Both(path) => Some((path, true)),
+        }
+    }
+}
+
 /// The options of every verb, with the environment and the defaults filled in.
 #[derive(Debug, Clone)]
 pub(crate) struct CommonArgs {
@@ -153,6 +164,8 @@ pub(crate) struct Reads {
     /// Whether the memory of an emulated board can be named: a served board keeps it in a file.
     pub(crate) emulated_memory: bool,
     pub(crate) manager: bool,
+    /// Whether the accelerator of an emulated board can be chosen.
+    pub(crate) accelerator: bool,
 }
 
 impl CommonOptions {
@@ -184,7 +197,17 @@ impl CommonOptions {
         let manager = manager.unwrap_or_default();
         let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
         let accelerator = match accelerator {
-            None if reads.board && emulated => {
+            Some(_) if !reads.accelerator => {
+                return Err("--accelerator is for run, solve, check, faults and serve".to_owned());
+            }
+            Some(_) if !emulated => {
+                return Err(
+                    "--accelerator is for an emulated board of this process; leave it out, \
+                            or add --board emulated"
+                        .to_owned(),
+                );
+            }
+            None if reads.accelerator && emulated => {
                 instead_of("--accelerator", RTL, &variable, simulator_path)?
             }
             given => given,

@@ -4,7 +4,8 @@
 # usage: boot.sh KERNEL INITRD LOG           KERNEL: a directory made by debian.sh or small.sh
 # environment: QEMU (qemu-system-aarch64), BOOT_LIMIT (seconds, 900),
 #   TREE (device tree source, tools/guest/zcu102.dts),
-#   BOARD (a program that plays the programmable logic: tools/guest/board; none)
+#   BOARD (a program that plays the programmable logic: tools/guest/board; none),
+#   SIMULATOR (of the accelerator of BOARD; none: the model)
 # Exit code: 0 when every check passed and the guest said so itself.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../lib.sh"
@@ -24,7 +25,7 @@ if [ -n "${BOARD:-}" ]; then
 	shared=(-object "memory-backend-file,id=ddr,size=2G,mem-path=$ram,share=on" -accel tcg
 		-qtest "unix:$scratch/qtest,server=on,wait=off" -qtest-log /dev/null)
 	begin "$BOARD" --memory "$ram" --qtest "$scratch/qtest" --mailbox 0x31000000 \
-		--limit "$limit" > "$log.board" 2>&1
+		--limit "$limit" ${SIMULATOR:+--simulator "$SIMULATOR"} > "$log.board" 2>&1
 	board=$!
 fi
 began=$(date +%s%N)

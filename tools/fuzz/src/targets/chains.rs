@@ -44,7 +44,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let space = Space::new(&BASES, STRETCH);
     let scatter_gather = !input.one_in(4);
     let config = BoardConfig { scatter_gather, strict: false, ..boards::any(&mut input) };
-    let board = EmulatedBoard::on_memory(config, Box::new(space.clone()), space.granted())
+    let board = EmulatedBoard::on_memory(config, Box::new(space.clone()), space.granted(), None)
         .expect("every choice can be built");
     let host = Host { port: board.cpu_port(), board };
     let mut scene = Scene { input, host, space, highs: vec![0], longest: 0 };

@@ -20,6 +20,8 @@ const EAGER: Duration = Duration::from_millis(2);
 const NAP: Duration = Duration::from_micros(50);
 /// Polls between two checks that the guest still runs.
 const LOOKS: u32 = 256;
+/// Longest time between two checks; a slice on a simulator takes most of a second.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// The interrupt line into the guest.
 pub trait Line {
@@ -107,6 +109,7 @@ impl<L: Line> Server<L> {
         let started = Instant::now();
         let mut last_access = started;
         let mut looks = 0_u32;
+        let mut looked = started;
         loop {
             if let Some(access) = self.desk.next_request()? {
                 self.serve_one(access)?;
@@ -118,8 +121,9 @@ impl<L: Line> Server<L> {
             }
             self.follow_the_clock()?;
             looks += 1;
-            if looks == LOOKS {
+            if looks == LOOKS || looked.elapsed() > LOOK {
                 looks = 0;
+                looked = Instant::now();
                 if !self.line.guest_runs().map_err(ServeError::Line)? {
                     return Ok(self.served);
                 }

@@ -5,6 +5,7 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
+use bitstream_model::external::{ExternalAccelerator, ModelAccelerator};
 use bitstream_model::interface::record::Beat;
 use bitstream_model::{BoardConfig, DeviceMemory, EmulatedBoard, ViolationKind};
 use guest_board::guest_file::{GuestFile, GuestPage};
@@ -114,11 +115,21 @@ impl Drop for Ending {
 
 /// Runs a guest whose buffers begin at `base` against a board with a grant of the buffers.
 fn with_guest<T>(base: u64, run: impl FnOnce(&mut Guest) -> T) -> (T, Served, EmulatedBoard) {
+    with_guest_on(None, base, run)
+}
+
+/// The same with another accelerator on the board, if there is one.
+fn with_guest_on<T>(
+    accelerator: Option<Box<dyn ExternalAccelerator>>,
+    base: u64,
+    run: impl FnOnce(&mut Guest) -> T,
+) -> (T, Served, EmulatedBoard) {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.as_file().set_len(GUEST_BYTES).expect("resized");
     let memory = GuestFile::open(file.path()).expect("opened");
     let granted = std::iter::once(BUFFERS..GUEST_BYTES).collect();
-    let board = EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory.clone()), granted)
+    let space = Box::new(memory.clone());
+    let board = EmulatedBoard::on_memory(BoardConfig::default(), space, granted, accelerator)
         .expect("the default board can be built");
     let wire = Wire::default();
     let page = memory.page(MAILBOX).expect("inside");
@@ -137,9 +148,21 @@ fn with_guest<T>(base: u64, run: impl FnOnce(&mut Guest) -> T) -> (T, Served, Em
 
 #[test]
 fn a_whole_step_in_shared_memory_ends_in_bullets_bits() {
+    two_steps(None);
+}
+
+#[test]
+fn another_accelerator_takes_the_same_steps() {
+    let model = ModelAccelerator::new(&BoardConfig::default()).expect("it can be built");
+    two_steps(Some(Box::new(model)));
+}
+
+fn two_steps(accelerator: Option<Box<dyn ExternalAccelerator>>) {
     // Twice: the first step's remains in registers and memory must not matter.
-    let (done, served, board) =
-        with_guest(BUFFERS, |guest| [one_cube::run(guest, LIMIT), one_cube::run(guest, LIMIT)]);
+    let (done, served, board) = with_guest_on(accelerator, BUFFERS, |guest| {
+        [one_cube::run(guest, LIMIT), one_cube::run(guest, LIMIT)]
+    });
+    assert_eq!(board.accelerator_error(), None);
     for done in done {
         let done = done.expect("the step is right");
         assert_eq!(done.interrupts, 1);
@@ -174,7 +197,8 @@ fn a_guest_that_does_not_end_is_left_after_the_limit() {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.as_file().set_len(GUEST_BYTES).expect("resized");
     let memory = GuestFile::open(file.path()).expect("opened");
-    let board = EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory.clone()), vec![])
+    let space = Box::new(memory.clone());
+    let board = EmulatedBoard::on_memory(BoardConfig::default(), space, vec![], None)
         .expect("the default board can be built");
     let page = memory.page(MAILBOX).expect("inside");
     let mut server = Server::new(board, page, Wire::default()).expect("a page");

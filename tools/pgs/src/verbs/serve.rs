@@ -12,7 +12,7 @@ use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
 
-use crate::board::not_built;
+use crate::board::{external_accelerator, not_built};
 use crate::common::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure, Verdict};
 use crate::interrupt;
@@ -28,6 +28,7 @@ Examples:
   pgs --board socket:/tmp/board                   in another
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
+  pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
 One driver at a time has the board; a connection that says nothing for 5 s is closed. A killed
 driver leaves the engines running, and the next driver resets them. Ctrl-C ends the server and
@@ -83,13 +84,14 @@ pub(crate) fn run(
         }
     };
     // A driver's mistake is reported, and the board goes on to serve the next driver.
-    let config = BoardConfig { strict: false, ..args.build.config() };
+    let mut config = BoardConfig { strict: false, ..args.build.config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
+    let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let wanted = args.memory_mib.map(|mib| mib << 20);
     let made = !path.exists();
     let memory = MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(no_memory)?;
     let addresses = memory.addresses();
-    let mut server = Server::bind(config, memory, &args.socket).map_err(|error| {
+    let mut server = Server::bind(config, memory, &args.socket, accelerator).map_err(|error| {
         let removed = if made { fs::remove_file(&path) } else { Ok(()) };
         if let Err(error) = removed {
             log::warn!("{} stays: {error}", path.display());
@@ -112,6 +114,9 @@ pub(crate) fn run(
 
     if !common.json {
         writeln!(out, "board      {}", described(&config))?;
+        if let Some((simulator, _)) = common.accelerator.simulator() {
+            writeln!(out, "simulator  {}", simulator.display())?;
+        }
         if let Some(plan) = &planned {
             writeln!(out, "faults     {plan}")?;
         }
@@ -122,6 +127,7 @@ pub(crate) fn run(
     }
     let mut tally = Tally::default();
     let mut written = Ok(());
+    let mut dead = None;
     let served = server.serve(|board, visit| {
         // A visit without requests only tested whether a board is served here.
         if visit.requests == 0 && matches!(visit.ended, Ended::Left) {
@@ -134,6 +140,11 @@ pub(crate) fn run(
             log::error!("driver {}: {violation}", tally.drivers);
         }
         tally.violations = board.counts().violations;
+        dead = board.accelerator_error();
+        if dead.is_some() {
+            // A board without its accelerator has no use for any driver.
+            stopper.stop();
+        }
         if !common.json {
             written = line(out, tally.drivers, &visit);
             if written.is_err() {
@@ -152,6 +163,7 @@ pub(crate) fn run(
             "requests": requests,
             "left_running": left_running,
             "violations": violations,
+            "accelerator_error": dead,
         });
         writeln!(out, "{document:#}")?;
     } else {
@@ -164,7 +176,13 @@ pub(crate) fn run(
             grouped(violations),
         )?;
     }
-    Ok(Verdict::Done)
+    match dead {
+        Some(reason) => {
+            let next = "serve the board again, with a simulator that runs";
+            Err(Failure::new(Cause::Hardware, reason).next(next))
+        }
+        None => Ok(Verdict::Done),
+    }
 }
 
 /// There is no memory for the board.

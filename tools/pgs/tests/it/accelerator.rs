@@ -2,10 +2,12 @@
 //! in `tools/scripts/rtl-test.sh`, which builds it.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
-use crate::common::{golden, run};
+use crate::common::{Ran, Tied, golden, pgs, run};
 
 fn solve(accelerator: &str, more: &[&str]) -> (Option<i32>, String) {
     let folder = golden("one_cube");
@@ -49,6 +51,51 @@ fn another_profile_than_the_generated_one_is_refused() {
     let (code, stderr) = solve("rtl:/no/such/simulator", &["--profile", "half"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("of profile float, not half"), "{stderr}");
+}
+
+fn serve(folder: &Path, accelerator: &str, more: &[&str]) -> Command {
+    let mut command = pgs();
+    command.args(["serve", "--memory-mib", "16", "--accelerator", accelerator]).args(more);
+    command.arg("--socket").arg(folder.join("board"));
+    command
+}
+
+#[test]
+fn a_board_is_not_served_without_its_simulator() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (more, reason) in [
+        (&[][..], "the simulator /no/such cannot be started"),
+        (&["--profile", "half"], "of profile float, not half"),
+    ] {
+        let ran = Ran::from(serve(folder.path(), "rtl:/no/such", more).output().expect("it runs"));
+        assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
+        assert!(ran.stderr.contains(reason), "{}", ran.stderr);
+        let left = fs::read_dir(folder.path()).expect("a folder").count();
+        assert_eq!(left, 0, "neither a socket nor memory is left");
+    }
+}
+
+#[test]
+fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // It answers the first request with the identification of an accelerator.
+    let ends = program(folder.path(), "#!/bin/sh\nprintf 1SGP\n");
+    let mut command = serve(folder.path(), &ends, &[]);
+    let server = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut server = Tied(server);
+    let mut lines = BufReader::new(server.0.stdout.as_mut().expect("a pipe")).lines();
+    let serving = lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("serving ")));
+    assert!(serving.is_some(), "a board is served");
+
+    let board = format!("socket:{}", folder.path().join("board").display());
+    let ran = run(["--board", &board, "--grid", "2x2x2"]);
+    assert_eq!(ran.code, Some(3), "{}", ran.stderr);
+
+    let mut stderr = String::new();
+    server.0.stderr.as_mut().expect("a pipe").read_to_string(&mut stderr).expect("text");
+    assert_eq!(server.0.wait().expect("it ends").code(), Some(4), "{stderr}");
+    let told = "error: the simulator has ended in the middle of a request";
+    assert!(stderr.contains(told) && stderr.contains("next: serve the board again"), "{stderr}");
 }
 
 #[test]

@@ -3,10 +3,11 @@
 
 use std::error::Error;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use bitstream_model::external::{ExternalAccelerator, ExternalError, SimulatorProcess};
 use bitstream_model::interface::address_map::{INTERRUPT_SPI, MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use clap::Parser;
@@ -22,8 +23,8 @@ const START_LIMIT: Duration = Duration::from_secs(30);
 /// QEMU is started with `-object memory-backend-file,id=ddr,size=SIZE,mem-path=FILE,share=on
 /// -machine memory-backend=ddr -accel tcg -qtest unix:SOCKET,server=on,wait=off`.
 ///
-/// Exit codes: 0 the driver made no mistake; 1 it did, or the guest could not be served; 2 wrong
-/// usage.
+/// Exit codes: 0 the driver made no mistake; 1 it did, or the guest could not be served to its end,
+/// or the simulator ended before it; 2 wrong usage.
 #[derive(Debug, Parser)]
 struct Args {
     /// File behind the guest's memory; its byte 0 is physical address 0
@@ -42,6 +43,10 @@ struct Args {
     /// The interrupt (SPI), as the device tree counts
     #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
     spi: u32,
+    /// Simulator of the generated Verilog, the accelerator in place of the model; `rtlgen simulator`
+    /// builds one
+    #[arg(long, value_name = "PATH")]
+    simulator: Option<PathBuf>,
     /// Time limit of the guest, seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     limit: u64,
@@ -78,7 +83,18 @@ fn main() -> ExitCode {
     }
 }
 
+/// How the board is built, and its accelerator where that is not the model.
+fn design(
+    simulator: Option<&Path>,
+) -> Result<(BoardConfig, Option<Box<dyn ExternalAccelerator>>), ExternalError> {
+    let mut config = BoardConfig::default();
+    let Some(path) = simulator else { return Ok((config, None)) };
+    let simulator = SimulatorProcess::start_for(&mut config, path)?;
+    Ok((config, Some(Box::new(simulator))))
+}
+
 fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    let (config, accelerator) = design(args.simulator.as_deref())?;
     let limit = Duration::from_secs(args.limit);
     // QEMU answers once its machine exists, and with it the memory.
     let line = QtestLine::connect(&args.qtest, args.spi, limit.min(START_LIMIT))
@@ -90,7 +106,7 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     if granted.is_empty() {
         granted.push(MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES);
     }
-    let board = EmulatedBoard::on_memory(BoardConfig::default(), Box::new(memory), granted)?;
+    let board = EmulatedBoard::on_memory(config, Box::new(memory), granted, accelerator)?;
     let ended = Server::new(board.clone(), page, line)?.serve(limit);
 
     let counts = board.counts();
@@ -109,8 +125,13 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     for violation in board.violations() {
         println!("board: {violation}");
     }
+    let dead = board.accelerator_error();
+    if let Some(reason) = &dead {
+        println!("board: {reason}");
+    }
     ended.map_err(Box::<ServeError>::new)?;
-    Ok(if counts.violations == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let good = counts.violations == 0 && dead.is_none();
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 #[cfg(test)]
