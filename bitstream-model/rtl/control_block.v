@@ -1,8 +1,9 @@
 // The registers of the accelerator (specification, section 4) behind AXI4-Lite.
 //
-// Offsets, capabilities and reset values come from the generated headers. Reads take one cycle; a
-// write takes effect in the cycle after both address and data are there. An AXI access of less than
-// 32 bits does not exist here: strobes are ignored, as the specification allows 32 bits only.
+// Offsets, capabilities and reset values come from the generated headers. Addresses and written data
+// are registered before anything looks at them: a read is answered in the third cycle after its
+// address, and a write takes effect in the second one. An AXI access of less than 32 bits does not
+// exist here: strobes are ignored, as the specification allows 32 bits only.
 `default_nettype none
 
 module control_block (
@@ -26,6 +27,7 @@ module control_block (
 
   output wire        interrupt,
   output reg         core_reset,
+  output reg         core_clear,     // core_reset | start
   output wire        starting,       // a start is being checked, or its end recorded
   output reg         start,
 
@@ -67,8 +69,8 @@ module control_block (
   localparam [31:0] ITERATIONS_TOP = ITERATIONS_MAX;
 
   // The shape table as it was written, for reads.
-  reg [31:0] inverse_mass [0:SHAPES-1];
-  reg [31:0] inverse_inertia [0:SHAPES-1];
+  (* ram_style = "distributed" *) reg [31:0] inverse_mass [0:SHAPES-1];
+  (* ram_style = "distributed" *) reg [31:0] inverse_inertia [0:SHAPES-1];
 
   reg        gie, done_bit, ready_bit, sticky;
   reg [2:0]  ier, isr;
@@ -81,31 +83,39 @@ module control_block (
 
   // ---- Reset: it clears one shape a cycle
 
+  reg       resets;                  // reset begins, by the pin or by the register
   reg [6:0] reset_left;
   wire      resetting = reset_left != 7'd0;
 
   // ---- Start: checked in steps, so that no product lies on the way of a register
 
-  reg        go, check, refused;
-  reg [31:0] bytes_bodies, bytes_collisions;
+  reg        go, check, refused, done_late;
+  reg [31:0] bytes_bodies, bytes_collisions, bytes;
   reg        bodies_wrong, contacts_wrong, frictions_wrong, too_many;
   wire       running = busy | go | check | start;
-  assign starting = go | check | start | refused | done;
+  assign starting = go | check | start | refused | done | done_late;
 
+  reg         writing;               // the registered write takes effect
+  reg  [11:0] write_address;
+  reg  [31:0] write_data;
+  reg         reading;               // a read is under way
+  reg         read_s1, read_s2;
+  reg  [11:0] read_address;
   wire        writes     = awvalid & wvalid & ~bvalid;
-  wire        write_here = writes & ~resetting;
-  wire        reads      = arvalid & ~rvalid;
+  wire        write_here = writing & ~resetting;
+  wire        reads      = arvalid & ~reading;
   assign awready = writes;
   assign wready  = writes;
   assign arready = reads;
 
-  wire shape_space_w = awaddr[11:10] == SHAPE_TABLE[11:10];
-  wire shape_space_r = araddr[11:10] == SHAPE_TABLE[11:10];
+  wire shape_space_w = write_address[11:10] == SHAPE_TABLE[11:10];
+  wire shape_space_r = read_address[11:10] == SHAPE_TABLE[11:10];
 
   always @(posedge clk) begin
     // The memory that the arguments need, and their checks, in registers: settled long before a start.
     bytes_bodies     <= bodies * BYTES_PER_BODY;
     bytes_collisions <= collisions * BYTES_PER_COLLISION;
+    bytes            <= bytes_bodies + bytes_collisions;
     bodies_wrong     <= (bodies == 32'd0) | (bodies > BODIES_MAX);
     contacts_wrong   <= contact_iterations > ITERATIONS_TOP;
     frictions_wrong  <= friction_iterations > ITERATIONS_TOP;
@@ -124,7 +134,8 @@ module control_block (
   wire ends   = done | refused;
   wire failed = refused | (done & error);
   wire [2:0] raised = ends ? {failed, 2'b11} & ier : 3'b000;
-  wire isr_write = write_here & (awaddr == OFFSET_ISR);
+  wire isr_write = write_here & (write_address == OFFSET_ISR);
+  wire arguments_wrong = bodies_wrong | contacts_wrong | frictions_wrong | too_many;
 
   always @(posedge clk) begin
     go      <= 1'b0;
@@ -132,24 +143,25 @@ module control_block (
     start   <= 1'b0;
     refused <= 1'b0;
     if (check) begin
-      refused <= bodies_wrong | contacts_wrong | frictions_wrong | too_many;
-      start   <= ~(bodies_wrong | contacts_wrong | frictions_wrong | too_many);
+      refused <= arguments_wrong;
+      start   <= ~arguments_wrong;
       if (bodies_wrong) fail(ERROR_ARGUMENT, 8'd0, {20'd0, OFFSET_BODIES});
       else if (contacts_wrong) fail(ERROR_ARGUMENT, 8'd0, {20'd0, OFFSET_CONTACT_ITERATIONS});
       else if (frictions_wrong) fail(ERROR_ARGUMENT, 8'd0, {20'd0, OFFSET_FRICTION_ITERATIONS});
-      else if (too_many) fail(ERROR_CAPACITY, 8'd0, bytes_bodies + bytes_collisions);
+      else if (too_many) fail(ERROR_CAPACITY, 8'd0, bytes);
     end
     if (done & error) fail(error_code, error_channel, error_detail);
 
     if (ends) begin
       done_bit  <= 1'b1;
       ready_bit <= 1'b1;
-    end else if (reads & (araddr == OFFSET_AP_CTRL)) begin
+    end else if (read_s1 & (read_address == OFFSET_AP_CTRL)) begin
       done_bit  <= 1'b0;
       ready_bit <= 1'b0;
     end
-    isr <= (isr ^ (isr_write ? wdata[2:0] & ier : 3'b000)) | raised;
-    if (done) begin
+    isr <= (isr ^ (isr_write ? write_data[2:0] & ier : 3'b000)) | raised;
+    done_late <= done;
+    if (done_late) begin
       last_cycles        <= cycles;
       last_work          <= work_cycles;
       last_wait          <= wait_cycles;
@@ -160,51 +172,52 @@ module control_block (
     end
 
     // Writes.
-    shape_write <= 2'b00;
+    writing       <= writes;
+    write_address <= awaddr;
+    write_data    <= wdata;
+    shape_write   <= 2'b00;
     if (bready) bvalid <= 1'b0;
     if (writes) bvalid <= 1'b1;
     if (write_here) begin
-      if ((awaddr == OFFSET_AP_CTRL) & wdata[0] & ~running & ~sticky) go <= 1'b1;
-      if (awaddr == OFFSET_GIE) gie <= wdata[0];
-      if (awaddr == OFFSET_IER) ier <= wdata[2:0];
+      if ((write_address == OFFSET_AP_CTRL) & write_data[0] & ~running & ~sticky) go <= 1'b1;
+      if (write_address == OFFSET_GIE) gie <= write_data[0];
+      if (write_address == OFFSET_IER) ier <= write_data[2:0];
       if (~running) begin
-        case (awaddr)
-          OFFSET_BODIES:               bodies              <= wdata;
-          OFFSET_COLLISIONS:           collisions          <= wdata;
-          OFFSET_CONTACT_ITERATIONS:   contact_iterations  <= wdata;
-          OFFSET_FRICTION_ITERATIONS:  friction_iterations <= wdata;
-          OFFSET_FLAGS:                flags               <= wdata;
-          OFFSET_TIME_STEP:            time_step           <= wdata;
-          OFFSET_POSITION_DRIFT:       drift               <= wdata;
-          OFFSET_POSITION_COEFFICIENT: coefficient         <= wdata;
-          OFFSET_FRICTION:             friction            <= wdata;
-          OFFSET_ANGULAR_DAMPING:      damping             <= wdata;
-          OFFSET_GRAVITY_X:            gravity_x           <= wdata;
-          OFFSET_GRAVITY_Y:            gravity_y           <= wdata;
-          OFFSET_GRAVITY_Z:            gravity_z           <= wdata;
+        case (write_address)
+          OFFSET_BODIES:               bodies              <= write_data;
+          OFFSET_COLLISIONS:           collisions          <= write_data;
+          OFFSET_CONTACT_ITERATIONS:   contact_iterations  <= write_data;
+          OFFSET_FRICTION_ITERATIONS:  friction_iterations <= write_data;
+          OFFSET_FLAGS:                flags               <= write_data;
+          OFFSET_TIME_STEP:            time_step           <= write_data;
+          OFFSET_POSITION_DRIFT:       drift               <= write_data;
+          OFFSET_POSITION_COEFFICIENT: coefficient         <= write_data;
+          OFFSET_FRICTION:             friction            <= write_data;
+          OFFSET_ANGULAR_DAMPING:      damping             <= write_data;
+          OFFSET_GRAVITY_X:            gravity_x           <= write_data;
+          OFFSET_GRAVITY_Y:            gravity_y           <= write_data;
+          OFFSET_GRAVITY_Z:            gravity_z           <= write_data;
           default: ;
         endcase
-        if (shape_space_w & ~awaddr[3]) begin
-          shape_write   <= awaddr[2] ? 2'b10 : 2'b01;
-          shape_address <= awaddr[9:4];
-          shape_in      <= wdata;
-          if (awaddr[2]) inverse_inertia[awaddr[9:4]] <= wdata;
-          else inverse_mass[awaddr[9:4]] <= wdata;
+        if (shape_space_w & ~write_address[3]) begin
+          shape_write   <= write_address[2] ? 2'b10 : 2'b01;
+          shape_address <= write_address[9:4];
+          shape_in      <= write_data;
         end
       end
     end
 
-    // Reset, by the pin or by the register.
+    // Reset.
+    resets     <= ~resetn | (write_here & (write_address == OFFSET_RESET) & write_data[0]);
     core_reset <= resetting;
+    core_clear <= resetting | resets | (check & ~arguments_wrong);
     if (resetting) begin
       reset_left    <= reset_left - 7'd1;
       shape_write   <= 2'b11;
       shape_address <= reset_left[5:0];
       shape_in      <= 32'd0;
-      inverse_mass[reset_left[5:0]]    <= 32'd0;
-      inverse_inertia[reset_left[5:0]] <= 32'd0;
     end
-    if (~resetn | (write_here & (awaddr == OFFSET_RESET) & wdata[0])) begin
+    if (resets) begin
       reset_left <= 7'd64;
       core_reset <= 1'b1;
       {gie, ier, isr, done_bit, ready_bit}        <= 9'd0;
@@ -216,77 +229,95 @@ module control_block (
       {damping, gravity_x, gravity_y, gravity_z}  <= 128'd0;
     end
     if (~resetn) begin
-      bvalid <= 1'b0;
+      {bvalid, writing, done_late} <= 3'b000;
       {last_cycles, last_impulse_total}                    <= 128'd0;
       {last_work, last_wait, last_hazards}                 <= 96'd0;
       {last_received, last_sent}                           <= 64'd0;
     end
   end
 
-  // ---- Reads
+  // ---- Reads: each kind of register is selected on its own, and those that are not asked for give 0
 
-  wire [31:0] shape_mass    = inverse_mass[araddr[9:4]];
-  wire [31:0] shape_inertia = inverse_inertia[araddr[9:4]];
-  reg  [31:0] read;
-  always @* begin
-    case (araddr)
-      OFFSET_AP_CTRL:              read = {28'd0, ready_bit, ~running, done_bit, running};
-      OFFSET_GIE:                  read = {31'd0, gie};
-      OFFSET_IER:                  read = {29'd0, ier};
-      OFFSET_ISR:                  read = {29'd0, isr};
-      OFFSET_BODIES:               read = bodies;
-      OFFSET_COLLISIONS:           read = collisions;
-      OFFSET_CONTACT_ITERATIONS:   read = contact_iterations;
-      OFFSET_FRICTION_ITERATIONS:  read = friction_iterations;
-      OFFSET_FLAGS:                read = flags;
-      OFFSET_TIME_STEP:            read = time_step;
-      OFFSET_POSITION_DRIFT:       read = drift;
-      OFFSET_POSITION_COEFFICIENT: read = coefficient;
-      OFFSET_FRICTION:             read = friction;
-      OFFSET_ANGULAR_DAMPING:      read = damping;
-      OFFSET_GRAVITY_X:            read = gravity_x;
-      OFFSET_GRAVITY_Y:            read = gravity_y;
-      OFFSET_GRAVITY_Z:            read = gravity_z;
-      OFFSET_IDENTIFICATION:       read = CAPABILITY_IDENTIFICATION;
-      OFFSET_VERSION:              read = CAPABILITY_VERSION;
-      OFFSET_PROFILE:              read = CAPABILITY_PROFILE;
-      OFFSET_FEATURES:             read = CAPABILITY_FEATURES;
-      OFFSET_CHANNELS:             read = CAPABILITY_CHANNELS;
-      OFFSET_MM2S_WIDTHS:          read = CAPABILITY_MM2S_WIDTHS;
-      OFFSET_S2MM_WIDTHS:          read = CAPABILITY_S2MM_WIDTHS;
-      OFFSET_ISSUE:                read = CAPABILITY_ISSUE;
-      OFFSET_CONTACT_DEPTH:        read = CAPABILITY_CONTACT_DEPTH;
-      OFFSET_FRICTION_DEPTH:       read = CAPABILITY_FRICTION_DEPTH;
-      OFFSET_CLOCK_KHZ:            read = CAPABILITY_CLOCK_KHZ;
-      OFFSET_BODY_CAPACITY:        read = CAPABILITY_BODY_CAPACITY;
-      OFFSET_COLLISION_CAPACITY:   read = CAPABILITY_COLLISION_CAPACITY;
-      OFFSET_SHAPE_CAPACITY:       read = SHAPES;
-      OFFSET_MEMORY_BYTES:         read = CAPABILITY_MEMORY_BYTES;
-      OFFSET_MEMORY_PER_RECORD:    read = CAPABILITY_MEMORY_PER_RECORD;
-      OFFSET_DMA:                  read = CAPABILITY_DMA;
-      OFFSET_ERROR:                read = {16'd0, channel, code};
-      OFFSET_ERROR_DETAIL:         read = detail;
-      OFFSET_CYCLES_LO:            read = last_cycles[31:0];
-      OFFSET_CYCLES_HI:            read = last_cycles[63:32];
-      OFFSET_WORK_CYCLES:          read = last_work;
-      OFFSET_WAIT_CYCLES:          read = last_wait;
-      OFFSET_HAZARDS:              read = last_hazards;
-      OFFSET_SUM_RECEIVED:         read = last_received;
-      OFFSET_SUM_SENT:             read = last_sent;
-      OFFSET_IMPULSE_SUM_LO:       read = last_impulse_total[31:0];
-      OFFSET_IMPULSE_SUM_HI:       read = last_impulse_total[63:32];
-      OFFSET_RESET:                read = {31'd0, resetting};
-      default: read = ~shape_space_r | araddr[3] ? 32'd0
-                    : araddr[2] ? shape_inertia : shape_mass;
-    endcase
-  end
+  reg [31:0] inverse_mass_read, inverse_inertia_read;
+  reg [31:0] argument_read, state_read, capability_read, result_read;
+  reg        asks_mass, asks_inertia;
   always @(posedge clk) begin
-    if (rready) rvalid <= 1'b0;
-    if (reads) begin
+    read_address <= araddr;
+    if (shape_write[0]) inverse_mass[shape_address] <= shape_in;
+    if (shape_write[1]) inverse_inertia[shape_address] <= shape_in;
+    inverse_mass_read    <= inverse_mass[read_address[9:4]];
+    inverse_inertia_read <= inverse_inertia[read_address[9:4]];
+    asks_mass            <= shape_space_r & (read_address[3:2] == 2'd0);
+    asks_inertia         <= shape_space_r & (read_address[3:2] == 2'd1);
+    case (read_address)
+      OFFSET_BODIES:               argument_read <= bodies;
+      OFFSET_COLLISIONS:           argument_read <= collisions;
+      OFFSET_CONTACT_ITERATIONS:   argument_read <= contact_iterations;
+      OFFSET_FRICTION_ITERATIONS:  argument_read <= friction_iterations;
+      OFFSET_FLAGS:                argument_read <= flags;
+      OFFSET_TIME_STEP:            argument_read <= time_step;
+      OFFSET_POSITION_DRIFT:       argument_read <= drift;
+      OFFSET_POSITION_COEFFICIENT: argument_read <= coefficient;
+      OFFSET_FRICTION:             argument_read <= friction;
+      OFFSET_ANGULAR_DAMPING:      argument_read <= damping;
+      OFFSET_GRAVITY_X:            argument_read <= gravity_x;
+      OFFSET_GRAVITY_Y:            argument_read <= gravity_y;
+      OFFSET_GRAVITY_Z:            argument_read <= gravity_z;
+      default:                     argument_read <= 32'd0;
+    endcase
+    case (read_address)
+      OFFSET_AP_CTRL:      state_read <= {28'd0, ready_bit, ~running, done_bit, running};
+      OFFSET_GIE:          state_read <= {31'd0, gie};
+      OFFSET_IER:          state_read <= {29'd0, ier};
+      OFFSET_ISR:          state_read <= {29'd0, isr};
+      OFFSET_ERROR:        state_read <= {16'd0, channel, code};
+      OFFSET_ERROR_DETAIL: state_read <= detail;
+      OFFSET_RESET:        state_read <= {31'd0, resetting};
+      default:             state_read <= 32'd0;
+    endcase
+    case (read_address)
+      OFFSET_IDENTIFICATION:     capability_read <= CAPABILITY_IDENTIFICATION;
+      OFFSET_VERSION:            capability_read <= CAPABILITY_VERSION;
+      OFFSET_PROFILE:            capability_read <= CAPABILITY_PROFILE;
+      OFFSET_FEATURES:           capability_read <= CAPABILITY_FEATURES;
+      OFFSET_CHANNELS:           capability_read <= CAPABILITY_CHANNELS;
+      OFFSET_MM2S_WIDTHS:        capability_read <= CAPABILITY_MM2S_WIDTHS;
+      OFFSET_S2MM_WIDTHS:        capability_read <= CAPABILITY_S2MM_WIDTHS;
+      OFFSET_ISSUE:              capability_read <= CAPABILITY_ISSUE;
+      OFFSET_CONTACT_DEPTH:      capability_read <= CAPABILITY_CONTACT_DEPTH;
+      OFFSET_FRICTION_DEPTH:     capability_read <= CAPABILITY_FRICTION_DEPTH;
+      OFFSET_CLOCK_KHZ:          capability_read <= CAPABILITY_CLOCK_KHZ;
+      OFFSET_BODY_CAPACITY:      capability_read <= CAPABILITY_BODY_CAPACITY;
+      OFFSET_COLLISION_CAPACITY: capability_read <= CAPABILITY_COLLISION_CAPACITY;
+      OFFSET_SHAPE_CAPACITY:     capability_read <= SHAPES;
+      OFFSET_MEMORY_BYTES:       capability_read <= CAPABILITY_MEMORY_BYTES;
+      OFFSET_MEMORY_PER_RECORD:  capability_read <= CAPABILITY_MEMORY_PER_RECORD;
+      OFFSET_DMA:                capability_read <= CAPABILITY_DMA;
+      default:                   capability_read <= 32'd0;
+    endcase
+    case (read_address)
+      OFFSET_CYCLES_LO:      result_read <= last_cycles[31:0];
+      OFFSET_CYCLES_HI:      result_read <= last_cycles[63:32];
+      OFFSET_WORK_CYCLES:    result_read <= last_work;
+      OFFSET_WAIT_CYCLES:    result_read <= last_wait;
+      OFFSET_HAZARDS:        result_read <= last_hazards;
+      OFFSET_SUM_RECEIVED:   result_read <= last_received;
+      OFFSET_SUM_SENT:       result_read <= last_sent;
+      OFFSET_IMPULSE_SUM_LO: result_read <= last_impulse_total[31:0];
+      OFFSET_IMPULSE_SUM_HI: result_read <= last_impulse_total[63:32];
+      default:               result_read <= 32'd0;
+    endcase
+
+    read_s1 <= reads;
+    read_s2 <= read_s1;
+    if (rvalid & rready) {reading, rvalid} <= 2'b00;
+    if (reads) reading <= 1'b1;
+    if (read_s2) begin
       rvalid <= 1'b1;
-      rdata  <= read;
+      rdata  <= argument_read | state_read | capability_read | result_read
+              | (inverse_mass_read & {32{asks_mass}}) | (inverse_inertia_read & {32{asks_inertia}});
     end
-    if (~resetn) rvalid <= 1'b0;
+    if (~resetn) {reading, read_s1, read_s2, rvalid} <= 4'b0000;
   end
 endmodule
 

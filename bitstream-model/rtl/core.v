@@ -13,6 +13,7 @@ module core (
   input  wire         clk,
   input  wire         reset,
   input  wire         start,
+  input  wire         clear,           // reset | start, in a register of its own
 
   // Arguments; they do not change while a step runs.
   input  wire [19:0]  bodies,
@@ -66,12 +67,13 @@ module core (
   localparam COLLISION      = COLLISION_BITS;  // bits of a collision's number
   localparam SHAPE          = 6;               // bits of a shape's number
 
-  wire clear = reset | start;
-  wire run   = busy & ~error;
+  wire run = busy & ~error;
 
   // Passes of the step; without collisions there are none.
   reg [8:0] contact_passes, friction_passes, passes;
+  reg       no_contacts;
   always @(posedge clk) begin
+    no_contacts     <= contact_passes == 9'd0;
     contact_passes  <= (collisions == 20'd0) ? 9'd0 : {1'b0, contact_iterations};
     friction_passes <= (collisions == 20'd0) ? 9'd0 : {1'b0, friction_iterations};
     passes          <= contact_passes + friction_passes;
@@ -79,7 +81,7 @@ module core (
 
   // ---- Sequence
 
-  wire phase, loading, finding, passing, draining, begin_pass, integrating;
+  wire phase, slot_begins, loading, finding, passing, draining, begin_pass, integrating;
   wire friction, first_of_kind, last_contact, parity;
   wire [1:0] loads, load_finished;
   wire issues, stalls, waits, enters, enter_finished;
@@ -93,7 +95,7 @@ module core (
     .loads(|loads), .load_finished(&load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
-    .busy(busy), .done(done), .phase(phase), .loading(loading), .finding(finding), .passing(passing),
+    .busy(busy), .done(done), .phase(phase), .slot_begins(slot_begins), .loading(loading), .finding(finding), .passing(passing),
     .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
     .friction(friction), .first_of_kind(first_of_kind), .last_contact(last_contact), .parity(parity),
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
@@ -113,20 +115,21 @@ module core (
   wire [255:0] body_pose;
   wire [127:0] head [0:3];
   wire [5:0]   count [0:3];
+  wire [3:0]   there;                  // a beat in the FIFO
   wire [31:0]  received [0:3];
   wire [20:0]  wrong_beat [0:3];
   wire [7:0]   wrong_code [0:3];
   wire [3:0]   pop, wrong, collision_begins;
-  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
+  wire         unused = &{1'b0, collision_begins[3], count[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
       receiver #(.CHANNEL(k)) stream (
-        .clk(clk), .reset(reset), .start(start), .run(run),
+        .clk(clk), .reset(reset), .start(start), .clear(clear), .run(run),
         .bodies(bodies), .collisions(collisions), .passes(passes),
         .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
         .tvalid(s_tvalid[k]), .tready(s_tready[k]),
-        .head(head[k]), .count(count[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),
+        .head(head[k]), .count(count[k]), .there(there[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),
         .sum(received[k]), .error(wrong[k]), .error_code(wrong_code[k]), .error_beat(wrong_beat[k])
       );
     end
@@ -140,7 +143,7 @@ module core (
 
   // ---- Load, and the properties of the bodies
 
-  wire [1:0]       load_ready, load_write, load_error, load_moves;
+  wire [1:0]       load_ready, load_write, load_error, shape_moves;
   wire [BODY-1:0]  load_address [0:1];
   wire [7:0]       load_shape [0:1];
   wire [191:0]     load_velocity [0:1];
@@ -151,14 +154,13 @@ module core (
     for (k = 0; k < 2; k = k + 1) begin : g_loader
       loader #(.BODY(BODY), .SHAPE(SHAPE), .ODD(k)) side (
         .clk(clk), .start(clear), .run(loading), .bodies(bodies),
-        .linear_there(count[2*k] != 6'd0), .linear(head[2*k]),
-        .angular_there(count[2*k+1] != 6'd0), .angular(head[2*k+1]),
+        .linear_there(there[2*k]), .linear(head[2*k]),
+        .angular_there(there[2*k+1]), .angular(head[2*k+1]),
         .ready(load_ready[k]), .other_ready(load_ready[1-k]), .pop(loads[k]), .finished(load_finished[k]),
-        .lookup(load_lookup[k]), .lookup_moves(load_moves[k]),
+        .lookup(load_lookup[k]), .lookup_moves(shape_moves[k]),
         .write(load_write[k]), .address(load_address[k]), .shape(load_shape[k]), .velocity(load_velocity[k]),
         .error(load_error[k]), .error_body(load_error_body[k])
       );
-      assign load_moves[k] = |properties[k][30:0];
     end
   endgenerate
 
@@ -168,14 +170,14 @@ module core (
     .loading(~finding & ~integrating),
     .write_a(load_write[0]),
     .address_a(load_write[0] ? load_address[0] : integrating ? entering : shape_of_a),
-    .shape_a(load_shape[0]), .lookup_a(load_lookup[0]), .properties_a(properties[0]),
+    .shape_a(load_shape[0]), .lookup_a(load_lookup[0]), .properties_a(properties[0]), .moves_a(shape_moves[0]),
     .write_b(load_write[1]), .address_b(load_write[1] ? load_address[1] : shape_of_b),
-    .shape_b(load_shape[1]), .lookup_b(load_lookup[1]), .properties_b(properties[1])
+    .shape_b(load_shape[1]), .lookup_b(load_lookup[1]), .properties_b(properties[1]), .moves_b(shape_moves[1])
   );
 
   // ---- Collisions: found, issued, registered
 
-  wire [5:0]         found;
+  wire               found;
   wire [COLLISION:0] last_use_a, last_use_b;
   wire [BODY-1:0]    found_a, found_b;
   wire               found_moves_a, found_moves_b;
@@ -193,6 +195,7 @@ module core (
     .load_b(load_write[1]), .load_address_b(load_address[1]),
     .shape_address_a(shape_of_a), .shape_address_b(shape_of_b),
     .properties_a(properties[0]), .properties_b(properties[1]),
+    .shape_moves_a(shape_moves[0]), .shape_moves_b(shape_moves[1]),
     .pop(issues), .found(found), .last_use_a(last_use_a), .last_use_b(last_use_b),
     .body_a(found_a), .body_b(found_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
     .mass_a(found_mass_a), .mass_b(found_mass_b), .points(found_points),
@@ -203,7 +206,7 @@ module core (
   reg  second;                         // the second beats are taken in this cycle
   wire [5:0] beats_needed = second ? 6'd3 : 6'd2;
   wire beats_there = (count[0] >= beats_needed) & (count[1] >= beats_needed) & (count[2] >= beats_needed)
-                   & (count[3] != 6'd0);
+                   & there[3];
   issue #(
     .COLLISION(COLLISION), .INTERLOCKED(DESIGN_INTERLOCKED),
     .CONTACT_WINDOW(CONTACT_WINDOW), .FRICTION_WINDOW(FRICTION_WINDOW)
@@ -214,12 +217,12 @@ module core (
     .issues(issues), .stalls(stalls), .waits(waits), .hazards(hazards)
   );
 
-  assign pop = loading ? {{2{loads[1]}}, {2{loads[0]}}}
-             : integrating ? {{2{pop_odd}}, {2{pop_even}}}
-             : {issues, {3{issues | second}}};
+  // Each of these is there in its own part of the step only.
+  assign pop = {{2{loads[1] | pop_odd}}, {2{loads[0] | pop_even}}} | {issues, {3{issues | second}}};
 
   // The seven beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
-  // pipeline is the first of them.
+  // pipeline is the first of them. The first of both registers takes whatever is there in a slot, and
+  // `second` tells whether that is a collision.
   reg  [511:0]    early;               // rows 0 to 3
   reg  [895:0]    rows;                // rows 0 to 6
   reg             valid;
@@ -229,7 +232,7 @@ module core (
   reg  [2:0]      early_points, points;
   always @(posedge clk) begin
     second <= issues & ~clear;
-    if (issues) begin
+    if (slot_begins) begin
       early <= {head[3], head[2], head[1], head[0]};
       {early_a, early_b, early_moves_a, early_moves_b} <= {found_a, found_b, found_moves_a, found_moves_b};
       {early_mass_a, early_mass_b, early_points}       <= {found_mass_a, found_mass_b, found_points};
@@ -256,12 +259,12 @@ module core (
   reg [LONGEST-1:0] slots;             // valid records, one bit a slot
   always @(posedge clk) begin
     if (clear) slots <= {LONGEST{1'b0}};
-    else if (~phase) slots <= {slots[LONGEST-2:0], valid};
+    else if (slot_begins) slots <= {slots[LONGEST-2:0], valid};
   end
   wire contact_ends  = ~friction & slots[CONTACT_DEPTH/2 - 1];
   wire friction_ends = friction & slots[FRICTION_DEPTH/2 - 1];
-  wire ends          = ~phase & (contact_ends | friction_ends);
-  wire reads_impulse = ~phase & (friction ? slots[(FRICTION_IMPULSES - READ_LATENCY)/2 - 1]
+  wire ends          = slot_begins & (contact_ends | friction_ends);
+  wire reads_impulse = slot_begins & (friction ? slots[(FRICTION_IMPULSES - READ_LATENCY)/2 - 1]
                                           : slots[(CONTACT_IMPULSES - READ_LATENCY)/2 - 1]);
 
   wire [BODY-1:0] contact_read_a, contact_read_b, friction_read_a, friction_read_b;
@@ -269,17 +272,17 @@ module core (
   wire            contact_moves_a, contact_moves_b, friction_moves_a, friction_moves_b;
   wire            contact_padding;
   delay #(.WIDTH(2*BODY), .SLOTS((CONTACT_VELOCITIES - READ_LATENCY)/2)) contact_reads (
-    .clk(clk), .enable(~phase), .d({body_a, body_b}), .q({contact_read_a, contact_read_b})
+    .clk(clk), .enable(slot_begins), .d({body_a, body_b}), .q({contact_read_a, contact_read_b})
   );
   delay #(.WIDTH(2*BODY), .SLOTS((FRICTION_VELOCITIES - READ_LATENCY)/2)) friction_reads (
-    .clk(clk), .enable(~phase), .d({body_a, body_b}), .q({friction_read_a, friction_read_b})
+    .clk(clk), .enable(slot_begins), .d({body_a, body_b}), .q({friction_read_a, friction_read_b})
   );
   delay #(.WIDTH(2*BODY + 3), .SLOTS(CONTACT_DEPTH/2)) contact_writes (
-    .clk(clk), .enable(~phase), .d({body_a, body_b, moves_a, moves_b, points == 3'd0}),
+    .clk(clk), .enable(slot_begins), .d({body_a, body_b, moves_a, moves_b, points == 3'd0}),
     .q({contact_write_a, contact_write_b, contact_moves_a, contact_moves_b, contact_padding})
   );
   delay #(.WIDTH(2*BODY + 2), .SLOTS(FRICTION_DEPTH/2)) friction_writes (
-    .clk(clk), .enable(~phase), .d({body_a, body_b, moves_a, moves_b}),
+    .clk(clk), .enable(slot_begins), .d({body_a, body_b, moves_a, moves_b}),
     .q({friction_write_a, friction_write_b, friction_moves_a, friction_moves_b})
   );
 
@@ -326,7 +329,7 @@ module core (
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
   ) accumulated (
     .clk(clk), .begin_pass(clear | begin_pass), .friction(friction), .first_of_kind(first_of_kind),
-    .last_contact(last_contact), .no_contacts(contact_passes == 9'd0), .read(reads_impulse),
+    .last_contact(last_contact), .no_contacts(no_contacts), .read(reads_impulse),
     .impulse0(impulse0), .impulse1(impulse1), .impulse2(impulse2), .impulse3(impulse3),
     .write(ends), .contact_impulses(contact_impulses), .contact_total(contact_total),
     .friction_impulses(friction_impulses)
@@ -339,7 +342,7 @@ module core (
   // ---- Pipelines
 
   contact contact_pipeline (
-    .clk(clk), .phase({phase, ~phase}),
+    .clk(clk), .phase({phase, slot_begins}),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
     .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
     .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
@@ -357,7 +360,7 @@ module core (
     .out_linear_b(contact_velocity_b[95:0]), .out_angular_b(contact_velocity_b[191:96])
   );
   friction friction_pipeline (
-    .clk(clk), .phase({phase, ~phase}),
+    .clk(clk), .phase({phase, slot_begins}),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
     .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
     .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
@@ -379,10 +382,10 @@ module core (
   wire         body_valid, body_moves;
   integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (
     .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .bodies(bodies), .room(&room),
-    .even_there((count[0] != 6'd0) & (count[1] != 6'd0)), .even_pose({head[1], head[0]}),
-    .odd_there((count[2] != 6'd0) & (count[3] != 6'd0)), .odd_pose({head[3], head[2]}),
+    .even_there(there[0] & there[1]), .even_pose({head[1], head[0]}),
+    .odd_there(there[2] & there[3]), .odd_pose({head[3], head[2]}),
     .pop_even(pop_even), .pop_odd(pop_odd), .enters(enters), .finished(enter_finished),
-    .address(entering), .inverse_mass(properties[0][30:0]),
+    .address(entering), .shape_moves(shape_moves[0]),
     .valid(body_valid), .pose(body_pose), .moves(body_moves)
   );
 
@@ -411,7 +414,7 @@ module core (
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_sender
       sender #(.ADDRESS(10)) stream (
-        .clk(clk), .reset(reset), .start(start), .run(run), .bodies(bodies),
+        .clk(clk), .clear(clear), .run(run), .bodies(bodies),
         .enters(enters), .has_room(room[k]), .push(result_valid), .row(result[k]),
         .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),
         .finished(sender_finished[k]), .sum(sent[k])

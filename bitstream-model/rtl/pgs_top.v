@@ -42,7 +42,7 @@ module pgs_top (
 
   output wire         irq
 );
-  wire        core_reset, start, done, error;
+  wire        core_reset, core_clear, start, done, error;
   // The simulator sees whether a step is under way.
   wire        busy /* verilator public_flat_rd */;
   wire        starting /* verilator public_flat_rd */;
@@ -71,7 +71,7 @@ module pgs_top (
     .bvalid(s_axi_bvalid), .bready(s_axi_bready),
     .araddr(s_axi_araddr), .arvalid(s_axi_arvalid), .arready(s_axi_arready),
     .rdata(s_axi_rdata), .rvalid(s_axi_rvalid), .rready(s_axi_rready),
-    .interrupt(irq), .core_reset(core_reset), .starting(starting), .start(start),
+    .interrupt(irq), .core_reset(core_reset), .core_clear(core_clear), .starting(starting), .start(start),
     .bodies(bodies), .collisions(collisions),
     .contact_iterations(contact_iterations), .friction_iterations(friction_iterations), .flags(flags),
     .time_step(time_step), .drift(drift), .coefficient(coefficient), .friction(friction),
@@ -83,7 +83,7 @@ module pgs_top (
   );
 
   core accelerator (
-    .clk(aclk), .reset(core_reset), .start(start),
+    .clk(aclk), .reset(core_reset), .start(start), .clear(core_clear),
     .bodies(bodies[19:0]), .collisions(collisions[19:0]),
     .contact_iterations(contact_iterations[7:0]), .friction_iterations(friction_iterations[7:0]),
     .integrate(flags[0]), .time_step(time_step), .drift(drift), .coefficient(coefficient),

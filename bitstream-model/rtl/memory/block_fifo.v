@@ -14,15 +14,17 @@ module block_fifo #(
   input  wire [WIDTH-1:0] in,
   input  wire             pop,
   output wire [WIDTH-1:0] head,
-  output reg  [ADDRESS:0] count
+  output wire             some       // there is a word
 );
   (* ram_style = "block" *) reg [WIDTH-1:0] words [0:(1<<ADDRESS)-1];
   reg [ADDRESS-1:0] newest, oldest, after_oldest;
+  reg [ADDRESS:0]   count;
   reg [WIDTH-1:0]   read, pushed;
   reg               none_left, one_left;       // count is 0, count is 1
   reg               head_is_pushed;
 
   wire [ADDRESS-1:0] next_oldest = pop ? after_oldest : oldest;
+  assign some = ~none_left;
   assign head = head_is_pushed ? pushed : read;
 
   always @(posedge clk) begin

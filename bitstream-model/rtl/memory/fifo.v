@@ -1,11 +1,13 @@
 // FIFO of 2^ADDRESS words in LUT memory whose oldest word is visible at `head` while `count` is not 0.
 //
-// The user pushes only while there is room and pops only while there is a word.
+// The user pushes only while there is room and pops only while there is a word. `some` and `below` are
+// registers, so that no comparison of the count lies on the way of a push or a pop.
 `default_nettype none
 
 module fifo #(
   parameter WIDTH   = 32,
-  parameter ADDRESS = 5
+  parameter ADDRESS = 5,
+  parameter LIMIT   = 1 << ADDRESS
 ) (
   input  wire             clk,
   input  wire             clear,
@@ -13,10 +15,15 @@ module fifo #(
   input  wire [WIDTH-1:0] in,
   input  wire             pop,
   output wire [WIDTH-1:0] head,
-  output reg  [ADDRESS:0] count
+  output reg  [ADDRESS:0] count,
+  output reg              some,     // count > 0
+  output reg              below     // count < LIMIT
 );
   (* ram_style = "distributed" *) reg [WIDTH-1:0] words [0:(1<<ADDRESS)-1];
   reg [ADDRESS-1:0] newest, oldest;
+
+  localparam [ADDRESS:0] TOP       = LIMIT;
+  localparam [ADDRESS:0] BELOW_TOP = LIMIT - 1;
 
   assign head = words[oldest];
 
@@ -26,11 +33,21 @@ module fifo #(
       newest <= {ADDRESS{1'b0}};
       oldest <= {ADDRESS{1'b0}};
       count  <= {(ADDRESS+1){1'b0}};
+      some   <= 1'b0;
+      below  <= 1'b1;
     end else begin
       if (push) newest <= newest + 1'b1;
       if (pop) oldest <= oldest + 1'b1;
-      if (push & ~pop) count <= count + 1'b1;
-      if (pop & ~push) count <= count - 1'b1;
+      if (push & ~pop) begin
+        count <= count + 1'b1;
+        some  <= 1'b1;
+        below <= count < BELOW_TOP;
+      end
+      if (pop & ~push) begin
+        count <= count - 1'b1;
+        some  <= count != 1;
+        below <= count <= TOP;
+      end
     end
   end
 endmodule

@@ -38,10 +38,12 @@ module finder #(
   output wire [BODY-1:0]      shape_address_b,
   input  wire [63:0]          properties_a,
   input  wire [63:0]          properties_b,
+  input  wire                 shape_moves_a,
+  input  wire                 shape_moves_b,
 
   // The collision that is issued next.
   input  wire                 pop,
-  output wire [5:0]           found,         // collisions that wait for their issue
+  output wire                 found,         // a collision waits for its issue
   output wire [COLLISION:0]   last_use_a,    // {parity, collision}
   output wire [COLLISION:0]   last_use_b,
   output wire [BODY-1:0]      body_a,
@@ -62,41 +64,44 @@ module finder #(
   // number; a count that is too large for three bits becomes 7.
   wire [BODY:0] next_a, next_b;
   wire [2:0]    next_count;
-  wire [5:0]    waiting_a, waiting_b, waiting_count;
+  wire          there_a, there_b, there_count, has_room;
   wire          take;
+  wire [5:0]    counts_left, a_left, b_left, found_left;
+  wire          counts_below, a_below, b_below;
+  wire          unused = &{1'b0, counts_left, a_left, b_left, found_left, counts_below, a_below, b_below};
   wire [2:0]    count_in = |count_word[31:3] ? 3'd7 : count_word[2:0];
 
   fifo #(.WIDTH(3), .ADDRESS(5)) counts (
     .clk(clk), .clear(clear), .push(count_comes), .in(count_in),
-    .pop(take), .head(next_count), .count(waiting_count)
+    .pop(take), .head(next_count), .count(counts_left), .some(there_count), .below(counts_below)
   );
   fifo #(.WIDTH(BODY + 1), .ADDRESS(5)) bodies_a (
     .clk(clk), .clear(clear), .push(body_a_comes), .in({|body_a_word[31:BODY], body_a_word[BODY-1:0]}),
-    .pop(take), .head(next_a), .count(waiting_a)
+    .pop(take), .head(next_a), .count(a_left), .some(there_a), .below(a_below)
   );
   fifo #(.WIDTH(BODY + 1), .ADDRESS(5)) bodies_b (
     .clk(clk), .clear(clear), .push(body_b_comes), .in({|body_b_word[31:BODY], body_b_word[BODY-1:0]}),
-    .pop(take), .head(next_b), .count(waiting_b)
+    .pop(take), .head(next_b), .count(b_left), .some(there_b), .below(b_below)
   );
 
-  assign take = run & phase & (waiting_a != 6'd0) & (waiting_b != 6'd0) & (waiting_count != 6'd0)
-              & (found < 6'd24);
+  assign take = run & phase & there_a & there_b & there_count & has_room;
 
   // The number and the pass of the collision that is taken.
   reg [COLLISION-1:0] number;
   reg [19:0]          left;
-  reg                 number_is_last, parity;
+  reg                 number_is_last, parity, one_collision;
   always @(posedge clk) begin
+    one_collision <= collisions == 20'd1;     // settled before a start
     if (clear) begin
       number         <= {COLLISION{1'b0}};
       left           <= collisions;
-      number_is_last <= collisions == 20'd1;
+      number_is_last <= one_collision;
       parity         <= 1'b0;
     end else if (take) begin
       if (number_is_last) begin
         number         <= {COLLISION{1'b0}};
         left           <= collisions;
-        number_is_last <= collisions == 20'd1;
+        number_is_last <= one_collision;
         parity         <= ~parity;
       end else begin
         number         <= number + 1'b1;
@@ -106,29 +111,29 @@ module finder #(
     end
   end
 
-  // Stage 0 reads, stage 1 writes, stage 3 has everything.
+  // Stage 0 reads, stage 1 writes and compares, stage 3 has everything.
   reg                 valid_s1, valid_s2, valid_s3;
-  reg [BODY-1:0]      a_s1, a_s2, a_s3, b_s1, b_s2, b_s3;
+  reg [BODY:0]        a_s1, b_s1;
+  reg [BODY-1:0]      a_s2, a_s3, b_s2, b_s3;
   reg [COLLISION-1:0] number_s1, number_s2, number_s3;
   reg                 parity_s1;
   reg [2:0]           count_s1, count_s2, count_s3;
-  reg                 beyond_s1, beyond_s2, beyond_s3;
-  reg                 same_s1, same_s2, same_s3;
-  wire                beyond_a = next_a[BODY] | ({{(20-BODY){1'b0}}, next_a[BODY-1:0]} >= bodies);
-  wire                beyond_b = next_b[BODY] | ({{(20-BODY){1'b0}}, next_b[BODY-1:0]} >= bodies);
+  reg                 beyond_s2, beyond_s3;
+  reg                 same_s2, same_s3;
+  wire                beyond_a = a_s1[BODY] | ({{(20-BODY){1'b0}}, a_s1[BODY-1:0]} >= bodies);
+  wire                beyond_b = b_s1[BODY] | ({{(20-BODY){1'b0}}, b_s1[BODY-1:0]} >= bodies);
   always @(posedge clk) begin
     valid_s1  <= take & ~clear;
-    a_s1      <= next_a[BODY-1:0];
-    b_s1      <= next_b[BODY-1:0];
+    a_s1      <= next_a;
+    b_s1      <= next_b;
     number_s1 <= number;
     parity_s1 <= parity;
     count_s1  <= next_count;
-    beyond_s1 <= beyond_a | beyond_b;
-    same_s1   <= next_a == next_b;
 
     valid_s2  <= valid_s1 & ~clear;
-    {a_s2, b_s2, number_s2, count_s2, beyond_s2, same_s2}
-      <= {a_s1, b_s1, number_s1, count_s1, beyond_s1, same_s1};
+    {a_s2, b_s2, number_s2, count_s2} <= {a_s1[BODY-1:0], b_s1[BODY-1:0], number_s1, count_s1};
+    beyond_s2 <= beyond_a | beyond_b;
+    same_s2   <= a_s1 == b_s1;
 
     valid_s3  <= valid_s2 & ~clear;
     {a_s3, b_s3, number_s3, count_s3, beyond_s3, same_s3}
@@ -141,8 +146,8 @@ module finder #(
   localparam [COLLISION:0] NEVER = {1'b1, {COLLISION{1'b0}}};
   wire                 uses = valid_s1 & (count_s1 != 3'd0);
   wire                 load = load_a | load_b;
-  wire [BODY-1:0]      use_address_a = load ? load_address_a : phase ? next_a[BODY-1:0] : a_s1;
-  wire [BODY-1:0]      use_address_b = load ? load_address_b : phase ? next_b[BODY-1:0] : b_s1;
+  wire [BODY-1:0]      use_address_a = load ? load_address_a : phase ? next_a[BODY-1:0] : a_s1[BODY-1:0];
+  wire [BODY-1:0]      use_address_b = load ? load_address_b : phase ? next_b[BODY-1:0] : b_s1[BODY-1:0];
   wire [COLLISION:0]   use_in = load ? NEVER : {parity_s1, number_s1};
   wire [COLLISION:0]   use_a_s2, use_b_s2;
   reg  [COLLISION:0]   use_a_s3, use_b_s3;
@@ -159,16 +164,16 @@ module finder #(
   end
 
   wire padding    = count_s3 == 3'd0;
-  wire moves_a_s3 = |properties_a[30:0] & ~padding;
-  wire moves_b_s3 = |properties_b[30:0] & ~padding;
+  wire moves_a_s3 = shape_moves_a & ~padding;
+  wire moves_b_s3 = shape_moves_b & ~padding;
 
   localparam WIDTH = 2 * (COLLISION + 1) + 2 * BODY + 2 + 128 + 3;
-  fifo #(.WIDTH(WIDTH), .ADDRESS(5)) found_collisions (
+  fifo #(.WIDTH(WIDTH), .ADDRESS(5), .LIMIT(24)) found_collisions (
     .clk(clk), .clear(clear), .push(valid_s3),
     .in({use_a_s3, use_b_s3, a_s3, b_s3, moves_a_s3, moves_b_s3, properties_a, properties_b, count_s3}),
     .pop(pop),
     .head({last_use_a, last_use_b, body_a, body_b, moves_a, moves_b, mass_a, mass_b, points}),
-    .count(found)
+    .count(found_left), .some(found), .below(has_room)
   );
 
   always @(posedge clk) begin

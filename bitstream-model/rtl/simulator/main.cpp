@@ -20,6 +20,7 @@
 #endif
 
 static const int STREAMS = 4;
+static const int READ_CLOCKS = 16;  // a read is answered long before
 static const size_t BEAT_WORDS = 5;  // four words and the marks
 
 static Vpgs_top *top;
@@ -115,6 +116,7 @@ static uint32_t read_register(uint32_t offset) {
   top->eval();
   rising_edge();
   top->s_axi_arvalid = 0;
+  for (int clocks = 0; clocks < READ_CLOCKS && !top->s_axi_rvalid; clocks++) rising_edge();
   const uint32_t value = top->s_axi_rdata;
   rising_edge();
   return value;

@@ -2,6 +2,9 @@
 //
 // A body's number at `address` gives its properties 3 cycles later. While `loading`, the properties
 // of the shape at `lookup` come one cycle later instead.
+//
+// The table holds beside each inverse mass whether it is other than 0, so that no reader has to look
+// at its 31 bits.
 `default_nettype none
 
 module body_shapes #(
@@ -20,16 +23,18 @@ module body_shapes #(
   input  wire [7:0]       shape_a,
   input  wire [SHAPE-1:0] lookup_a,
   output reg  [63:0]      properties_a,  // {inverse inertia, inverse mass}
+  output reg              moves_a,       // the inverse mass is not 0
   input  wire             write_b,
   input  wire [BODY-1:0]  address_b,
   input  wire [7:0]       shape_b,
   input  wire [SHAPE-1:0] lookup_b,
-  output reg  [63:0]      properties_b
+  output reg  [63:0]      properties_b,
+  output reg              moves_b
 );
-  (* ram_style = "distributed" *) reg [31:0] inverse_mass [0:(1<<SHAPE)-1];
+  (* ram_style = "distributed" *) reg [32:0] inverse_mass [0:(1<<SHAPE)-1];
   (* ram_style = "distributed" *) reg [31:0] inverse_inertia [0:(1<<SHAPE)-1];
   always @(posedge clk) begin
-    if (table_write[0]) inverse_mass[table_address] <= table_in;
+    if (table_write[0]) inverse_mass[table_address] <= {|table_in[30:0], table_in};
     if (table_write[1]) inverse_inertia[table_address] <= table_in;
   end
 
@@ -45,8 +50,10 @@ module body_shapes #(
   wire [SHAPE-1:0] index_a = loading ? lookup_a : found_a[SHAPE-1:0];
   wire [SHAPE-1:0] index_b = loading ? lookup_b : found_b[SHAPE-1:0];
   always @(posedge clk) begin
-    properties_a <= {inverse_inertia[index_a], inverse_mass[index_a]};
-    properties_b <= {inverse_inertia[index_b], inverse_mass[index_b]};
+    properties_a[63:32]             <= inverse_inertia[index_a];
+    {moves_a, properties_a[31:0]}   <= inverse_mass[index_a];
+    properties_b[63:32]             <= inverse_inertia[index_b];
+    {moves_b, properties_b[31:0]}   <= inverse_mass[index_b];
   end
 endmodule
 

@@ -24,8 +24,8 @@ module constants (
   localparam MULTIPLY = FMUL_LATENCY;
   localparam DIVIDE   = FDIV_LATENCY;
   localparam [5:0] SQUARE = 6'd0;              // cycle in which dt * dt enters
-  localparam [5:0] CUBE   = SQUARE + MULTIPLY;
-  localparam [5:0] SERIES = CUBE + MULTIPLY;
+  localparam [5:0] CUBE   = SQUARE + MULTIPLY + 6'd1;
+  localparam [5:0] SERIES = CUBE + MULTIPLY + 6'd1;
 
   reg [5:0] cycle;
   reg       running;
@@ -39,37 +39,36 @@ module constants (
     end
   end
 
-  // Products enter in these cycles and come out MULTIPLY cycles later.
+  // The operands are registered in these cycles; the product comes out MULTIPLY + 1 cycles later.
   wire [31:0] product, quotient;
-  reg  [31:0] a, b;
-  always @* begin
-    b = time_step;
+  reg  [31:0] a, b, numerator;
+  always @(posedge clk) begin
+    numerator <= (cycle == 6'd0) ? 32'h3f800000 : SOLVER_ROTATION_LIMIT;
+    b <= time_step;
     case (cycle)
-      SQUARE:  a = time_step;
-      6'd1:    a = 32'h3f000000;
-      6'd2:    a = gravity_x;
-      6'd3:    a = gravity_y;
-      6'd4:    a = gravity_z;
-      CUBE:    a = product;
+      SQUARE:  a <= time_step;
+      6'd1:    a <= 32'h3f000000;
+      6'd2:    a <= gravity_x;
+      6'd3:    a <= gravity_y;
+      6'd4:    a <= gravity_z;
+      CUBE:    a <= product;
       default: begin
-        a = product;
-        b = SOLVER_SERIES_TERM;
+        a <= product;
+        b <= SOLVER_SERIES_TERM;
       end
     endcase
   end
-  wire [31:0] numerator = (cycle == 6'd0) ? 32'h3f800000 : SOLVER_ROTATION_LIMIT;
-
   fmul multiplier (.clk(clk), .a(a), .b(b), .y(product));
   fdiv divider (.clk(clk), .a(numerator), .b(time_step), .y(quotient));
 
   always @(posedge clk) if (running) begin
-    if (cycle == 6'd1 + MULTIPLY) half_step           <= product;
-    if (cycle == 6'd2 + MULTIPLY) gravity_step[31:0]  <= product;
-    if (cycle == 6'd3 + MULTIPLY) gravity_step[63:32] <= product;
-    if (cycle == 6'd4 + MULTIPLY) gravity_step[95:64] <= product;
-    if (cycle == SERIES + MULTIPLY) series            <= product;
-    if (cycle == DIVIDE) per_second                   <= quotient;
-    if (cycle == DIVIDE + 6'd1) speed_limit           <= quotient;
+    if (cycle == 6'd2 + MULTIPLY) half_step           <= product;
+    if (cycle == 6'd3 + MULTIPLY) gravity_step[31:0]  <= product;
+    if (cycle == 6'd4 + MULTIPLY) gravity_step[63:32] <= product;
+    if (cycle == 6'd5 + MULTIPLY) gravity_step[95:64] <= product;
+    if (cycle == SERIES + MULTIPLY + 6'd1) series     <= product;
+    if (cycle == DIVIDE + 6'd1) per_second            <= quotient;
+    if (cycle == DIVIDE + 6'd2) speed_limit           <= quotient;
   end
 endmodule
 

@@ -23,7 +23,7 @@ module integrator #(
   output wire            enters,
   output reg             finished,     // all bodies have entered
   output reg  [BODY-1:0] address,      // of velocity and shape
-  input  wire [30:0]     inverse_mass, // its magnitude, 3 cycles after the address
+  input  wire            shape_moves,  // 3 cycles after the address
 
   // Cycle 0 of the pipeline.
   output wire            valid,
@@ -56,7 +56,7 @@ module integrator #(
     pose_s1  <= odd ? odd_pose : even_pose;
   end
 
-  wire moves_now = |inverse_mass & integrate;
+  wire moves_now = shape_moves & integrate;
   timed_flag #(.STAGES(READ_LATENCY)) valid_late (.clk(clk), .clear(start), .d(valid_s1), .q(valid));
   pipeline_register #(.WIDTH(256), .STAGES(READ_LATENCY)) pose_late (.clk(clk), .d(pose_s1), .q(pose));
   pipeline_register #(.WIDTH(1), .STAGES(READ_LATENCY - SHAPE_LATENCY)) moves_late (

@@ -41,9 +41,10 @@ module loader #(
   reg  [7:0]  shape_s1;
   reg [191:0] velocity_s1, velocity_s2;
 
-  // Bodies left on this side, as a down-counter with a prepared flag.
-  reg  [19:0] left;
-  wire [19:0] share = (bodies + ((ODD == 0) ? 20'd1 : 20'd0)) >> 1;
+  // Bodies left on this side, as a down-counter with a prepared flag. Its first values are registers,
+  // settled before a start.
+  reg  [19:0] left, share;
+  reg         no_share;
 
   assign ready    = finished | (linear_there & angular_there);
   assign pop      = run & ~finished & ready & other_ready;
@@ -51,10 +52,12 @@ module loader #(
   assign velocity = lookup_moves ? velocity_s2 : 192'd0;
 
   always @(posedge clk) begin
+    share    <= (bodies + ((ODD == 0) ? 20'd1 : 20'd0)) >> 1;
+    no_share <= share == 20'd0;
     if (start) begin
       body     <= (ODD == 0) ? 20'd0 : 20'd1;
       left     <= share;
-      finished <= share == 20'd0;
+      finished <= no_share;
     end else if (pop) begin
       body     <= body + 20'd2;
       left     <= left - 20'd1;

@@ -38,8 +38,9 @@ module step_sequence #(
   output reg         busy,
   output reg         done,              // one cycle, at the end of a step or with its error
   output reg         phase,             // of the pipelines: 0 in the cycles of an issue
+  output reg         slot_begins,       // ~phase, in a register of its own
   output wire        loading,
-  output wire        finding,
+  output reg         finding,
   output reg         passing,
   output wire        draining,
   output wire        begin_pass,        // in the cycle before a pass or the integration
@@ -50,8 +51,8 @@ module step_sequence #(
   output reg         parity,            // of the pass; of the next one while it drains
 
   output reg  [63:0] cycles,
-  output reg  [31:0] work_cycles,       // saturates
-  output reg  [31:0] wait_cycles        // saturates
+  output wire [31:0] work_cycles,       // saturates; counted a cycle later
+  output wire [31:0] wait_cycles        // saturates; counted a cycle later
 );
   localparam [3:0] SETUP = 4'd10;
   localparam [3:0] FIND  = 4'd4;        // cycle of the setup from which on the finder runs
@@ -76,13 +77,13 @@ module step_sequence #(
   reg [8:0]  contacts_left, frictions_left;
   reg        pass_is_last;              // no pass follows this one
   reg        no_passes;
+  reg        no_contacts, one_contact, no_frictions, one_collision;   // settled before a start
   reg [9:0]  leave;
   reg        leave_over;
   reg [2:0]  settle;
   reg        lost, lost_to_stream;      // the second cycle of a slot that was lost
 
   assign loading     = state == LOAD;
-  assign finding     = (state == PREPARE & setup >= FIND) | state == PASS | state == DRAIN;
   assign draining    = state == DRAIN;
   assign integrating = state == ENTER | state == LEAVE;
 
@@ -95,22 +96,29 @@ module step_sequence #(
 
   always @(posedge clk) begin
     done <= 1'b0;
+    no_contacts   <= contact_passes == 9'd0;
+    one_contact   <= contact_passes == 9'd1;
+    no_frictions  <= friction_passes == 9'd0;
+    one_collision <= collisions == 20'd1;
     // The phase runs from the setup on, so that every step has the same.
-    phase <= (state == IDLE | state == LOAD) ? 1'b0 : ~phase;
+    phase       <= (state == IDLE | state == LOAD) ? 1'b0 : ~phase;
+    slot_begins <= (state == IDLE | state == LOAD) ? 1'b1 : phase;
     if (reset) begin
       state   <= IDLE;
       busy    <= 1'b0;
       passing <= 1'b0;
+      finding <= 1'b0;
     end else if (start) begin
       state          <= LOAD;
       busy           <= 1'b1;
       passing        <= 1'b0;
+      finding        <= 1'b0;
       setup          <= 4'd0;
       contacts_left  <= contact_passes;
       frictions_left <= friction_passes;
-      no_passes      <= (contact_passes == 9'd0) & (friction_passes == 9'd0);
-      friction       <= contact_passes == 9'd0;
-      last_contact   <= contact_passes == 9'd1;
+      no_passes      <= no_contacts & no_frictions;
+      friction       <= no_contacts;
+      last_contact   <= one_contact;
       first_of_kind  <= 1'b1;
       parity         <= 1'b0;
       leave          <= FINISH[9:0];
@@ -119,6 +127,7 @@ module step_sequence #(
       state   <= IDLE;
       busy    <= 1'b0;
       passing <= 1'b0;
+      finding <= 1'b0;
       done    <= 1'b1;
     end else begin
       case (state)
@@ -126,9 +135,11 @@ module step_sequence #(
         PREPARE: begin
           setup    <= setup + 4'd1;
           left     <= collisions;
-          left_one <= collisions == 20'd1;
+          left_one <= one_collision;
+          if (setup == FIND - 4'd1) finding <= 1'b1;
           if (setup_ends) begin
             state   <= no_passes ? ENTER : PASS;
+            finding <= ~no_passes;
             passing <= ~no_passes;
           end
         end
@@ -149,8 +160,9 @@ module step_sequence #(
           drain     <= drain - 10'd1;
           drain_one <= drain == 10'd1;
           left      <= collisions;
-          left_one  <= collisions == 20'd1;
+          left_one  <= one_collision;
           if (drain_one) begin
+            finding       <= ~pass_is_last;
             state         <= pass_is_last ? ENTER : PASS;
             passing       <= ~pass_is_last;
             first_of_kind <= ~friction & last_of_kind;
@@ -180,25 +192,33 @@ module step_sequence #(
     end
   end
 
-  // Where the cycle went.
+  // Where the cycle went. The counts follow a cycle behind, so that their adders begin at registers, and
+  // a 33rd bit tells that one has run over.
   wire lost_here = (loading & ~loads & ~load_finished) | stalls | waits
                  | (state == ENTER & ~enters & ~enter_finished)
                  | (state == LEAVE & leave_over & ~results_finished);
   wire waiting   = lost_here & ~stalls;
   wire lost_slot = stalls | waits;
+  reg        works, loses;
+  reg [31:0] worked, waited;
+  reg        worked_full, waited_full;
+  assign work_cycles = worked | {32{worked_full}};
+  assign wait_cycles = waited | {32{waited_full}};
   always @(posedge clk) begin
     lost           <= lost_slot;
     lost_to_stream <= waits;
+    works          <= busy & ~lost_here & ~lost;
+    loses          <= busy & (waiting | lost_to_stream);
+    {worked_full, worked} <= {worked_full, 32'd0} | ({1'b0, worked} + {32'd0, works});
+    {waited_full, waited} <= {waited_full, 32'd0} | ({1'b0, waited} + {32'd0, loses});
+    if (busy) cycles <= cycles + 64'd1;
     if (start) begin
-      cycles      <= 64'd0;
-      work_cycles <= 32'd0;
-      wait_cycles <= 32'd0;
-      lost        <= 1'b0;
-      lost_to_stream <= 1'b0;
-    end else if (busy) begin
-      cycles <= cycles + 64'd1;
-      if (~lost_here & ~lost & ~&work_cycles) work_cycles <= work_cycles + 32'd1;
-      if ((waiting | lost_to_stream) & ~&wait_cycles) wait_cycles <= wait_cycles + 32'd1;
+      cycles                <= 64'd0;
+      {worked_full, worked} <= 33'd0;
+      {waited_full, waited} <= 33'd0;
+      {works, loses}        <= 2'b00;
+      lost                  <= 1'b0;
+      lost_to_stream        <= 1'b0;
     end
   end
 endmodule

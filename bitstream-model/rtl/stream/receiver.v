@@ -16,6 +16,7 @@ module receiver #(
   input  wire         clk,
   input  wire         reset,
   input  wire         start,            // a step begins; the arguments stay as they are
+  input  wire         clear,            // reset or start
   input  wire         run,              // beats are taken
   input  wire [19:0]  bodies,
   input  wire [19:0]  collisions,
@@ -29,6 +30,7 @@ module receiver #(
 
   output wire [127:0] head,             // the oldest beat
   output wire [5:0]   count,            // beats in the FIFO
+  output wire         there,            // count > 0
   input  wire         pop,
   output wire         collision_begins, // `tdata` is the stream's first beat of a collision
 
@@ -48,7 +50,7 @@ module receiver #(
   // Beats of a packet on this stream.
   localparam [20:0] BODY_OFFSET = 21'd3 - CHANNEL;
   reg [20:0] body_beats, pass_beats;
-  reg        body_beats_none, body_beats_one, pass_beats_one, passes_none;
+  reg        body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
   wire [20:0] body_beats_next = ({bodies, 1'b0} + BODY_OFFSET) >> 2;
   wire [20:0] pass_beats_next = (CHANNEL == 3) ? {1'b0, collisions} : {collisions, 1'b0};
   always @(posedge clk) begin
@@ -58,6 +60,7 @@ module receiver #(
     body_beats_one  <= body_beats_next == 21'd1;
     pass_beats_one  <= pass_beats_next == 21'd1;
     passes_none     <= passes == 9'd0;
+    passes_one      <= passes == 9'd1;
   end
 
   reg [1:0]  segment;
@@ -68,9 +71,10 @@ module receiver #(
   reg [20:0] beat;           // number of the next beat in its packet
   reg        second;         // the second beat of a collision comes next
 
+  wire has_room;
   wire accepted = tvalid & tready;
   wire in_pass  = segment == PASSES;
-  assign tready           = run & (segment != FINISHED) & (count < 6'd28);
+  assign tready           = run & (segment != FINISHED) & has_room;
   assign collision_begins = accepted & in_pass & ~second;
 
   // The segment after this one.
@@ -98,7 +102,7 @@ module receiver #(
     end else if (start) begin
       begin_packet(first_segment);
       passes_left  <= passes;
-      pass_is_last <= passes == 9'd1;
+      pass_is_last <= passes_one;
     end else if (accepted) begin
       if (beat_is_last) begin
         begin_packet(next_segment);
@@ -119,12 +123,13 @@ module receiver #(
     end
   end
 
-  fifo #(.WIDTH(128), .ADDRESS(5)) beats (
-    .clk(clk), .clear(reset | start), .push(accepted), .in(tdata), .pop(pop), .head(head), .count(count)
+  fifo #(.WIDTH(128), .ADDRESS(5), .LIMIT(28)) beats (
+    .clk(clk), .clear(clear), .push(accepted), .in(tdata), .pop(pop), .head(head),
+    .count(count), .some(there), .below(has_room)
   );
 
   word_sum words (
-    .clk(clk), .clear(reset | start), .valid(accepted), .beat(tdata), .sum(sum)
+    .clk(clk), .clear(clear), .valid(accepted), .beat(tdata), .sum(sum)
   );
 endmodule
 

@@ -9,8 +9,7 @@ module sender #(
   parameter ADDRESS = 10       // the FIFO holds 2^ADDRESS rows
 ) (
   input  wire         clk,
-  input  wire         reset,
-  input  wire         start,
+  input  wire         clear,    // reset, or a step begins
   input  wire         run,      // rows leave
   input  wire [19:0]  bodies,
 
@@ -31,25 +30,29 @@ module sender #(
 
   reg [ADDRESS:0]  credits;
   reg [19:0]       rows_left, beats_left;
-  reg              row_is_last;
-  wire [ADDRESS:0] count;
+  reg              row_is_last, one_row;
+  reg              taken, given;     // a credit, in the cycle before
+  wire             some;
   wire             leaves = tvalid & tready;
 
-  assign tvalid = run & (count != {(ADDRESS+1){1'b0}});
+  assign tvalid = run & some;
 
   always @(posedge clk) begin
-    if (reset | start) begin
+    one_row <= bodies == 20'd1;
+    taken   <= enters & ~clear;
+    given   <= leaves & ~clear;
+    if (clear) begin
       credits     <= CREDITS;
       has_room    <= 1'b1;
       rows_left   <= bodies;
-      row_is_last <= bodies == 20'd1;
+      row_is_last <= one_row;
       beats_left  <= bodies;
       finished    <= 1'b0;
     end else begin
-      if (enters & ~leaves) credits <= credits - 1'b1;
-      if (leaves & ~enters) credits <= credits + 1'b1;
-      // One body may enter before this flag is seen.
-      has_room <= credits > 2;
+      if (taken & ~given) credits <= credits - 1'b1;
+      if (given & ~taken) credits <= credits + 1'b1;
+      // Two bodies may enter before this flag tells of them.
+      has_room <= credits > 3;
       if (push) begin
         rows_left   <= rows_left - 20'd1;
         row_is_last <= rows_left == 20'd2;
@@ -62,12 +65,12 @@ module sender #(
   end
 
   block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
-    .clk(clk), .clear(reset | start), .push(push), .in({row_is_last, row}), .pop(leaves),
-    .head({tlast, tdata}), .count(count)
+    .clk(clk), .clear(clear), .push(push), .in({row_is_last, row}), .pop(leaves),
+    .head({tlast, tdata}), .some(some)
   );
 
   word_sum words (
-    .clk(clk), .clear(reset | start), .valid(push), .beat(row), .sum(sum)
+    .clk(clk), .clear(clear), .valid(push), .beat(row), .sum(sum)
   );
 endmodule
 

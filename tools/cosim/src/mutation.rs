@@ -73,9 +73,9 @@ pub const MUTATIONS: &[Mutation] = &[
     },
     Mutation {
         name: "a body that moves and weighs nothing counts as static",
-        file: "finder.v",
-        right: "wire moves_a_s3 = |properties_a[30:0] & ~padding;",
-        wrong: "wire moves_a_s3 = |properties_a[30:23] & ~padding;",
+        file: "body_shapes.v",
+        right: "inverse_mass[table_address] <= {|table_in[30:0], table_in};",
+        wrong: "inverse_mass[table_address] <= {|table_in[30:23], table_in};",
     },
 ];
 

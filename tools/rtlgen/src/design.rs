@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
         // The slowest one: the second quotient, with registers before and behind the divider.
-        let ready = Operation::Divide.operator().latency + 3;
+        let ready = Operation::Divide.operator().latency + 4;
         // One pair of bodies, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];
