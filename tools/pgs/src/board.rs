@@ -224,8 +224,16 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<OpenBoard, Failure> {
     let ChosenBoard { options, observer, reason, .. } =
         find(common, build.config(), build.board_option())?;
-    let accelerator = Accelerator::open(options).map_err(unusable)?;
+    let accelerator = Accelerator::open(options)
+        .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
     Ok(OpenBoard { accelerator, observer, injected: None, reason })
+}
+
+/// The failure for an external accelerator that does not answer any more.
+fn dead(observer: Option<&EmulatedBoard>) -> Option<Failure> {
+    let reason = observer?.accelerator_error()?;
+    let next = "no body was changed, and the next command starts a new simulator";
+    Some(Failure::new(Cause::Hardware, reason).next(next))
 }
 
 /// The failure for a board that is missing or cannot be opened.
@@ -253,9 +261,8 @@ impl OpenBoard {
                 false => failure,
             };
         }
-        if let Some(reason) = self.observer.as_ref().and_then(EmulatedBoard::accelerator_error) {
-            return Failure::new(Cause::Hardware, reason)
-                .next("the step changed no body; the next command starts a new simulator");
+        if let Some(failure) = dead(self.observer.as_ref()) {
+            return failure;
         }
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
             if matches!(**fault, Fault::NotFinite { .. }));

@@ -13,7 +13,7 @@ use pgs_interface::record::result;
 pub struct Difference {
     /// The place.
     pub place: DifferencePlace,
-    /// Clock cycles from the start of the step to it.
+    /// Clock cycles from the last start or reset to it.
     pub cycle: u64,
     /// The model's value.
     pub model: u32,
@@ -103,7 +103,7 @@ impl fmt::Display for Difference {
         if number {
             write!(f, " ({:e})", float(*hardware))?;
         }
-        write!(f, ", {cycle} cycles after the start of the step")?;
+        write!(f, ", {cycle} cycles after the last start or reset")?;
         match (waveform, no_waveform) {
             (Some(path), _) => write!(f, "; waveform: {}", path.display()),
             (None, Some(reason)) => write!(f, "; no waveform: {reason}"),

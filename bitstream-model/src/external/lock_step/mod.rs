@@ -63,7 +63,7 @@ pub struct LockStep {
     /// Beats of each stream that the hardware has taken and the model has not.
     ahead: Vec<VecDeque<StreamBeat>>,
     results: Vec<Results>,
-    /// Clocks since the start of the step.
+    /// Clocks since the last start or reset.
     cycle: u64,
     busy: bool,
     model_busy: bool,
@@ -254,6 +254,7 @@ impl ExternalAccelerator for LockStep {
             self.busy = false;
             self.model_busy = false;
             self.resetting = true;
+            self.cycle = 0;
         }
         self.history.write(offset, value);
         self.hardware.write(offset, value)?;
