@@ -28,7 +28,7 @@ module control_block (
   output wire        interrupt,
   output reg         core_reset,
   output reg         core_clear,     // core_reset | start
-  output wire        starting,       // a start is being checked, or its end recorded
+  output wire        starting,       // a start is being checked, or the end of a step recorded
   output reg         start,
 
   output reg  [31:0] bodies,
@@ -131,8 +131,10 @@ module control_block (
     end
   endtask
 
-  wire ends   = done | refused;
-  wire failed = refused | (done & error);
+  // A step that ends while a reset begins has not ended for the registers.
+  wire done_here = done & ~resetting;
+  wire ends      = done_here | refused;
+  wire failed    = refused | (done_here & error);
   wire [2:0] raised = ends ? {failed, 2'b11} & ier : 3'b000;
   wire isr_write = write_here & (write_address == OFFSET_ISR);
   wire arguments_wrong = bodies_wrong | contacts_wrong | frictions_wrong | too_many;
@@ -150,7 +152,7 @@ module control_block (
       else if (frictions_wrong) fail(ERROR_ARGUMENT, 8'd0, {20'd0, OFFSET_FRICTION_ITERATIONS});
       else if (too_many) fail(ERROR_CAPACITY, 8'd0, bytes);
     end
-    if (done & error) fail(error_code, error_channel, error_detail);
+    if (done_here & error) fail(error_code, error_channel, error_detail);
 
     if (ends) begin
       done_bit  <= 1'b1;

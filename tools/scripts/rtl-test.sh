@@ -4,7 +4,8 @@
 #
 # usage: tools/scripts/rtl-test.sh             a few minutes
 #        tools/scripts/rtl-test.sh steps       instead, the driver's whole steps through registers and DMA:
-#                                              all recorded ones, faults, 500 random ones in lock step
+#                                              all recorded ones, and faults; then 500 random steps against
+#                                              the model, and 500 among register accesses in lock step
 #        tools/scripts/rtl-test.sh mutations   instead, seeded mistakes in the Verilog: each must be found
 #        tools/scripts/rtl-test.sh --help
 #

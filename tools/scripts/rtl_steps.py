@@ -13,6 +13,8 @@ import sys
 
 # Largest difference of the cycles where the memory's bandwidth makes the streams wait.
 CYCLES_TOLERANCE = 0.0002
+# Seconds that a command may take; a run of 60 steps as given takes a simulator an hour.
+LIMIT = 3 * 3600
 # Figures that are equal at any bandwidth.
 EXACT = ("digest", "stalls", "hazards", "work_cycles")
 
@@ -20,7 +22,7 @@ EXACT = ("digest", "stalls", "hazards", "work_cycles")
 def pgs(program, verb, *options):
     """The JSON document of a command on the emulated board, and its exit code."""
     command = [program, "--board", "emulated", "--json", *verb, "--subnormals", "flush", *options]
-    ran = subprocess.run(command, capture_output=True, text=True)
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
     if ran.returncode not in (0, 1):
         sys.exit(f"{' '.join(command)}: exit code {ran.returncode}\n{ran.stderr}")
     return json.loads(ran.stdout), ran.returncode
@@ -58,7 +60,8 @@ def main():
                 options = ["--hazards", hazards, "--bandwidth", bandwidth]
                 if hazards == "interlocked":
                     verb.append("--compare")
-                model = figures(pgs(program, verb, *options)[0])
+                on_model = (*options, "--accelerator", "model")
+                model = figures(pgs(program, verb, *on_model)[0])
                 found, code = pgs(program, verb, *options, "--accelerator", f"rtl:{simulator}")
                 hardware = figures(found)
                 wrong = differences(model, hardware, bandwidth)
@@ -68,7 +71,7 @@ def main():
                 print(f"{folder} {hazards} {bandwidth}: {hardware}: {result}", flush=True)
     for order in ("as-given", "auto"):
         verb = ["run", "--grid", "5x5x5", "--steps", "60", "--order", order]
-        model = pgs(program, verb)[0]["digest"]["value"]
+        model = pgs(program, verb, "--accelerator", "model")[0]["digest"]["value"]
         hardware = pgs(program, verb, "--accelerator", f"rtl:{interlocked}")[0]["digest"]["value"]
         failed += model != hardware
         print(f"run --grid 5x5x5 --steps 60 --order {order}: {hardware}, model {model}", flush=True)

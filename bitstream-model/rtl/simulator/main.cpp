@@ -69,7 +69,7 @@ static bool record(bool on) {
     delete waveform;
     waveform = nullptr;
   }
-  return waveform_path != nullptr;
+  return on ? waveform != nullptr && waveform->isOpen() : true;
 }
 
 static void dump() {
@@ -117,6 +117,8 @@ static uint32_t read_register(uint32_t offset) {
   rising_edge();
   top->s_axi_arvalid = 0;
   for (int clocks = 0; clocks < READ_CLOCKS && !top->s_axi_rvalid; clocks++) rising_edge();
+  // Without an answer there is no accelerator.
+  if (!top->s_axi_rvalid) _exit(3);
   const uint32_t value = top->s_axi_rdata;
   rising_edge();
   return value;

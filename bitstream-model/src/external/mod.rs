@@ -31,8 +31,9 @@ const OFFERED_BEATS: usize = 64;
 /// Clocks that the accelerator runs before the DMAs move beats again. A simulated clock takes longer than
 /// an exchange with the simulator's process.
 const BATCH_CLOCKS: u64 = 8;
-/// Clocks of its reset at most, and between two looks at it.
+/// Most clocks of its reset.
 const RESET_CLOCKS: u32 = 8192;
+/// Clocks between two looks at its reset.
 const RESET_BATCH: u32 = 64;
 /// Clocks after a register access of an accelerator that does nothing else.
 const SETTLE_CLOCKS: u32 = 4;

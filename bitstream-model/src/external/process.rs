@@ -24,7 +24,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards, Subnormals};
@@ -157,8 +157,10 @@ impl SimulatorProcess {
     }
 
     fn answer<const N: usize>(&mut self, act: &'static str) -> Result<[u32; N], ExternalError> {
+        let until = Instant::now() + self.deadline;
         while self.rest.len() < 4 * N {
-            match self.answers.recv_timeout(self.deadline) {
+            let left = until.saturating_duration_since(Instant::now());
+            match self.answers.recv_timeout(left) {
                 Ok(Ok(bytes)) => self.rest.extend(bytes),
                 Ok(Err(source)) => return Err(ExternalError::Ended { act, source }),
                 Err(RecvTimeoutError::Timeout) => {
@@ -248,7 +250,7 @@ impl ExternalAccelerator for SimulatorProcess {
 }
 
 impl Drop for SimulatorProcess {
-    /// A simulator ends when its standard input is closed; one that hangs is killed.
+    /// Closes its standard input and kills it: it has nothing left to do.
     fn drop(&mut self) {
         drop(self.requests.take());
         // Ended or not: the kill of a process that has ended does nothing.

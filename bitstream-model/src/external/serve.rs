@@ -37,10 +37,11 @@ pub fn serve(
     answers: &mut dyn Write,
 ) -> Result<(), ServeError> {
     loop {
-        let [request, first, second] = match words(requests) {
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(()),
-            read => read?,
-        };
+        let mut first_byte = [0];
+        if requests.read(&mut first_byte)? == 0 {
+            return Ok(());
+        }
+        let [request, first, second] = words(&mut first_byte.chain(&mut *requests))?;
         let answer = match request {
             READ => vec![accelerator.read(first)?],
             WRITE => {
@@ -88,12 +89,14 @@ fn run(
     let level = if clocked.interrupt { INTERRUPT } else { 0 } | if clocked.busy { BUSY } else { 0 };
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
     let mut answer = vec![clocked.clocks, level];
-    answer.extend(clocked.taken.iter().copied().map(count));
-    answer.extend(clocked.sent.iter().map(Vec::len).map(count));
+    let taken = |stream: usize| clocked.taken.get(stream).copied().unwrap_or(0);
+    let sent = |stream: usize| clocked.sent.get(stream).map_or(0, Vec::len);
+    answer.extend((0..STREAMS).map(taken).map(count));
+    answer.extend((0..STREAMS).map(sent).map(count));
     for (stream, beats) in clocked.sent.iter().enumerate() {
         for (at, beat) in beats.iter().enumerate() {
             let clock = clocked.sent_at.get(stream).and_then(|clocks| clocks.get(at));
-            let clock = clock.copied().unwrap_or(clocked.clocks);
+            let clock = clock.copied().unwrap_or(clocked.clocks.saturating_sub(1));
             answer.extend(beat.beat.0);
             answer.push(u32::from(beat.last) | clock << CLOCK_LSB);
         }

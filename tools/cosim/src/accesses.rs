@@ -1,5 +1,5 @@
 //! Random register accesses before, in and after a step: interrupt registers, arguments and START while
-//! the accelerator is busy, writes to registers that only read, a reset in the middle of a packet.
+//! the accelerator is busy, writes to read-only registers, a reset in the middle of a packet.
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer};
 use pgs_interface::control::{
@@ -17,12 +17,12 @@ const AT_REST: u32 = 8;
 /// Clocks of a step that is left alone at most.
 const CLOCKS_MAX: u64 = 10_000_000;
 
-/// Makes the accesses of a seed. The accelerator is one in lock step with the model, which names the
-/// first difference.
+/// Makes the accesses of a seed; whether the step has ended. The accelerator is one in lock step with the
+/// model, which names the first difference.
 ///
 /// # Errors
 /// The difference, or an accelerator that does not answer.
-pub fn run(both: &mut dyn ExternalAccelerator, seed: u64) -> Result<(), ExternalError> {
+pub fn run(both: &mut dyn ExternalAccelerator, seed: u64) -> Result<bool, ExternalError> {
     let mut random = SplitMix64::new(seed);
     let case = case(seed);
     let beats = packets(&case.scene, case.fault);
@@ -39,14 +39,16 @@ pub fn run(both: &mut dyn ExternalAccelerator, seed: u64) -> Result<(), External
     while feed.busy && feed.clocks < CLOCKS_MAX {
         if feed.clocks >= reset_at {
             // The beats of the interrupted step are gone; a whole step follows.
-            let found = outcome::run(both, &case.scene, &beats)?;
-            debug_assert!(found.ended);
+            feed.busy = !outcome::run(both, &case.scene, &beats)?.ended;
             break;
         }
         if random.below(8) == 0 {
             access(both, &mut random, true)?;
         }
         feed.exchange(both)?;
+    }
+    if feed.busy {
+        return Ok(false);
     }
     both.run(64, &Offer::default())?;
     for register in REGISTERS {
@@ -58,7 +60,7 @@ pub fn run(both: &mut dyn ExternalAccelerator, seed: u64) -> Result<(), External
     for register in REGISTERS {
         both.read(register.offset)?;
     }
-    Ok(())
+    Ok(true)
 }
 
 /// One access; never one that starts or resets an accelerator at rest.

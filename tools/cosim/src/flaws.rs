@@ -10,14 +10,14 @@ use pgs_interface::control::{AP_CTRL, ap_ctrl};
 use pgs_interface::record::result;
 
 /// The flaws of an accelerator.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Flaws {
     /// The body whose linear velocity is wrong.
     pub wrong: Option<usize>,
     /// Exchanges of beats after which the process ends.
-    pub dies_after: u64,
+    pub dies_after: Option<u64>,
     /// Exchanges of beats after which it answers no more.
-    pub hangs_after: u64,
+    pub hangs_after: Option<u64>,
 }
 
 /// The model with flaws.
@@ -55,10 +55,11 @@ impl ExternalAccelerator for Flawed {
 
     fn run(&mut self, limit: u32, offer: &Offer) -> Result<Clocked, ExternalError> {
         self.exchanges += u64::from(self.busy);
-        if self.exchanges > self.flaws.dies_after {
+        let reached = |after: Option<u64>| after.is_some_and(|after| self.exchanges > after);
+        if reached(self.flaws.dies_after) {
             process::exit(1);
         }
-        while self.exchanges > self.flaws.hangs_after {
+        while reached(self.flaws.hangs_after) {
             thread::park();
         }
         let mut clocked = self.model.run(limit, offer)?;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bitstream_model::external::{
-    ExternalAccelerator, LockStep, ModelAccelerator, SimulatorProcess, serve,
+    ExternalAccelerator, ExternalError, LockStep, ModelAccelerator, SimulatorProcess, serve,
 };
 use bitstream_model::{BoardConfig, Hazards, Subnormals};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -42,6 +42,7 @@ Examples:
   cosim random --simulator target/rtl/pgs-rtl --cases 1000
   cosim random --simulator target/rtl/pgs-rtl --gaps 300 --stalls 700
   cosim errors --simulator target/rtl/pgs-rtl
+  cosim registers --simulator target/rtl/pgs-rtl --cases 500
   cosim mutations                      builds a simulator for each: about a minute and a half each
 
 Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
@@ -135,13 +136,13 @@ enum Verb {
         /// Behaviour on a hazard
         #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
         hazards: HazardMode,
-        /// A mistake: the first word of this body's linear velocity has a wrong lowest bit
+        /// Flips the lowest bit of the first word of this body's linear velocity
         #[arg(long, value_name = "BODY")]
         wrong: Option<usize>,
-        /// A death: the process ends after this number of exchanges of beats
+        /// Ends the process after this number of exchanges of beats
         #[arg(long, value_name = "N")]
         dies_after: Option<u64>,
-        /// A hang: it answers no more after this number of exchanges of beats
+        /// Stops answering after this number of exchanges of beats
         #[arg(long, value_name = "N")]
         hangs_after: Option<u64>,
         /// GAPS, STALLS, SEED and WAVEFORM of a real simulator; without effect here
@@ -198,7 +199,14 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
             let rtl = SimulatorProcess::start_with(&simulator.simulator, &simulator.disturbance())?;
             let mut both = LockStep::new(&simulator.hazards.config(), Box::new(rtl), None)?;
             for seed in *seed..*seed + *cases {
-                accesses::run(&mut both, seed).map_err(|error| format!("seed {seed}: {error}"))?;
+                let difference = match accesses::run(&mut both, seed) {
+                    Ok(true) => continue,
+                    Ok(false) => "neither ends the step".to_owned(),
+                    Err(ExternalError::Difference(difference)) => difference.to_string(),
+                    Err(error) => return Err(error.into()),
+                };
+                writeln!(out, "seed {seed}: {difference}")?;
+                return Ok(ExitCode::FAILURE);
             }
             writeln!(
                 out,
@@ -208,10 +216,9 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
         }
         Verb::Errors { simulator } => run_errors(simulator, out)?,
         Verb::Model { hazards, wrong, dies_after, hangs_after, .. } => {
-            let model = ModelAccelerator::new(&hazards.config())?;
-            let [dies_after, hangs_after] =
-                [dies_after, hangs_after].map(|n| n.unwrap_or(u64::MAX));
-            let mut flawed = Flawed::new(model, Flaws { wrong: *wrong, dies_after, hangs_after });
+            let [dies_after, hangs_after] = [*dies_after, *hangs_after];
+            let flaws = Flaws { wrong: *wrong, dies_after, hangs_after };
+            let mut flawed = Flawed::new(ModelAccelerator::new(&hazards.config())?, flaws);
             serve(&mut flawed, &mut io::stdin().lock(), out)?;
             true
         }

@@ -31,7 +31,7 @@ pub struct Outcome {
     pub error: [u32; 2],
     /// Whether the step ended at all.
     pub ended: bool,
-    /// The formula's cycles, the cycles of waiting for a stream, and all others.
+    /// Cycles by the formula.
     pub work: u32,
     /// The cycles of waiting for a stream.
     pub waits: u32,

@@ -18,8 +18,6 @@ use pgs_interface::record::result;
 use step_folder::folder::Folder;
 use zynq_pgs::{Accelerator, BoardChoice, Error, OpenOptions, StepParameters};
 
-const NO_FLAWS: Flaws = Flaws { wrong: None, dies_after: u64::MAX, hangs_after: u64::MAX };
-
 fn config() -> BoardConfig {
     BoardConfig { subnormals: Subnormals::Flush, ..BoardConfig::default() }
 }
@@ -62,7 +60,7 @@ fn step(board: &EmulatedBoard, folder: &Folder) -> (Option<Error>, bool) {
 
 #[test]
 fn equals_run_random_steps_in_lock_step_without_a_difference() {
-    let mut both = lock_step(NO_FLAWS);
+    let mut both = lock_step(Flaws::default());
     for seed in 1..=100 {
         let case = random::case(seed);
         let beats = packets(&case.scene, case.fault);
@@ -72,9 +70,10 @@ fn equals_run_random_steps_in_lock_step_without_a_difference() {
 
 #[test]
 fn equals_take_random_register_accesses_alike() {
-    let mut both = lock_step(NO_FLAWS);
+    let mut both = lock_step(Flaws::default());
     for seed in 1..=50 {
-        accesses::run(&mut both, seed).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        let ended = accesses::run(&mut both, seed).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        assert!(ended, "{seed}");
     }
 }
 
@@ -82,7 +81,7 @@ fn equals_take_random_register_accesses_alike() {
 fn a_wrong_word_is_named_with_its_record_and_its_values() {
     let folder = golden("two_cubes");
     let scene = cosim::recorded::scene(&folder);
-    let mut both = lock_step(Flaws { wrong: Some(1), ..NO_FLAWS });
+    let mut both = lock_step(Flaws { wrong: Some(1), ..Flaws::default() });
     let error = outcome::run(&mut both, &scene, &packets(&scene, None)).expect_err("a difference");
     let ExternalError::Difference(difference) = error else { panic!("{error}") };
     let Difference { place, cycle, model, hardware, .. } = *difference;
@@ -132,7 +131,7 @@ fn a_simulator_that_dies_or_hangs_in_a_step_is_named_and_the_bodies_stay() {
 
 #[test]
 fn a_difference_ends_the_step_and_the_bodies_stay() {
-    let board = board(Box::new(lock_step(Flaws { wrong: Some(1), ..NO_FLAWS })));
+    let board = board(Box::new(lock_step(Flaws { wrong: Some(1), ..Flaws::default() })));
     let (error, untouched) = step(&board, &golden("two_cubes"));
     assert!(error.is_some() && untouched);
     let reason = board.accelerator_error().expect("a reason");

@@ -198,7 +198,7 @@ impl CommonOptions {
         let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
         let accelerator = match accelerator {
             Some(_) if !reads.accelerator => {
-                return Err("--accelerator is for run, solve, check, faults and serve".to_owned());
+                return Err("this command takes no --accelerator".to_owned());
             }
             Some(_) if !emulated => {
                 return Err(

@@ -13,7 +13,7 @@ use pgs_interface::record::result;
 pub struct Difference {
     /// The place.
     pub place: DifferencePlace,
-    /// Clock cycles from the last start or reset to it.
+    /// Clock cycles from the last start or reset to it, without the clocks of register accesses.
     pub cycle: u64,
     /// The model's value.
     pub model: u32,

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::super::{Clocked, ExternalAccelerator, ExternalError, Offer, SimulatorProcess};
-use pgs_interface::control::{AP_CTRL, ISR, RESET};
+use pgs_interface::control::{AP_CTRL, GIE, IER, ISR, RESET, reset};
 
-/// Beats that are kept: with more in a step, it cannot be played again.
+/// Beats and requests that are kept: with more in a step, it cannot be played again.
 const BEATS_MAX: usize = 4 << 20;
+const REQUESTS_MAX: usize = 1 << 20;
 /// Clocks that the waveform shows.
 const SHOWN_CLOCKS: u64 = 400;
 
@@ -18,28 +19,41 @@ enum Request {
     Run(u32, Offer),
 }
 
-/// The registers as a step found them, and its requests.
-#[derive(Debug, Default)]
+/// The registers as a step found them, and the requests since its start.
+#[derive(Debug)]
 pub(super) struct History {
+    kept: bool,
     registers: BTreeMap<u32, u32>,
     step: Vec<Request>,
+    /// Values that were written at rest since the start; the next step finds them.
+    written: BTreeMap<u32, u32>,
     beats: usize,
 }
 
 /// Why there is no waveform.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum NoWaveform {
-    #[error("the step has more than {BEATS_MAX} beats")]
+    #[error("the step has more than {BEATS_MAX} beats or {REQUESTS_MAX} requests")]
     Long,
-    #[error("the simulator has none; build it with `rtlgen simulator --waveform`")]
+    #[error(
+        "the simulator writes none, or not beside itself; build it with `rtlgen simulator \
+         --waveform` in a folder that can be written"
+    )]
     NotBuilt,
     #[error(transparent)]
     Simulator(#[from] ExternalError),
 }
 
 impl History {
+    /// A history that keeps requests, or one that forgets them at once.
+    pub(super) fn new(kept: bool) -> Self {
+        let (registers, written) = (BTreeMap::new(), BTreeMap::new());
+        Self { kept, registers, step: Vec::new(), written, beats: 0 }
+    }
+
     /// A step begins.
     pub(super) fn start(&mut self) {
+        self.registers.append(&mut self.written);
         self.step.clear();
         self.beats = 0;
     }
@@ -48,15 +62,25 @@ impl History {
         self.add(Request::Read(offset));
     }
 
-    pub(super) fn write(&mut self, offset: u32, value: u32) {
-        if ![AP_CTRL, ISR, RESET].map(|register| register.offset).contains(&offset) {
-            self.registers.insert(offset, value);
+    /// A write; a busy accelerator takes those of its interrupt alone.
+    pub(super) fn write(&mut self, offset: u32, value: u32, busy: bool) {
+        if offset == RESET.offset && reset::RESET.is_set(value) {
+            self.registers.clear();
+            self.written.clear();
+        }
+        let acts = [AP_CTRL, ISR, RESET].map(|register| register.offset).contains(&offset);
+        let interrupt = [GIE, IER].map(|register| register.offset).contains(&offset);
+        if self.kept && !acts && (!busy || interrupt) {
+            self.written.insert(offset, value);
         }
         self.add(Request::Write(offset, value));
     }
 
     /// Clocks that have passed, with the beats that were taken in them.
     pub(super) fn run(&mut self, clocked: &Clocked, offer: &Offer) {
+        if !self.kept {
+            return;
+        }
         let beats = offer.beats.iter().zip(&clocked.taken).map(|(beats, taken)| {
             let taken = beats.len().min(*taken);
             beats[..taken].to_vec()
@@ -67,9 +91,13 @@ impl History {
     }
 
     fn add(&mut self, request: Request) {
-        if self.beats <= BEATS_MAX {
+        if self.kept && !self.is_full() {
             self.step.push(request);
         }
+    }
+
+    fn is_full(&self) -> bool {
+        self.beats > BEATS_MAX || self.step.len() >= REQUESTS_MAX
     }
 
     /// The first request that the waveform shows.
@@ -86,14 +114,13 @@ impl History {
 
     /// Plays the step again; the path of the waveform of its last clocks.
     pub(super) fn waveform(&self, simulator: &Path) -> Result<PathBuf, NoWaveform> {
-        if self.beats > BEATS_MAX {
+        if self.is_full() {
             return Err(NoWaveform::Long);
         }
         let waveform = simulator.with_extension("vcd");
         let arguments = ["0", "0", "1"].map(str::to_owned).into_iter();
         let arguments: Vec<_> = arguments.chain([waveform.display().to_string()]).collect();
         let mut process = SimulatorProcess::start_with(simulator, &arguments)?;
-        // The registers as the step found them; a value that the step wrote itself comes again.
         for (offset, value) in &self.registers {
             process.write(*offset, *value)?;
         }

@@ -26,9 +26,10 @@ use pgs_interface::control::{
 };
 use pgs_interface::register::Register;
 
-/// Clocks that the model may need after the hardware for the same step.
-const CATCH_UP_CLOCKS: u32 = 100_000;
-/// Clocks of one catching up.
+/// Clocks that one of them may need after the other for the same step, while it does not wait for a
+/// stream.
+const APART_CLOCKS: u64 = 100_000;
+/// Clocks that the model catches up at once.
 const CATCH_UP_BATCH: u32 = 64;
 /// Beats of each stream that the model is offered at once.
 const OFFERED_BEATS: usize = 256;
@@ -59,14 +60,17 @@ pub struct LockStep {
     config: BoardConfig,
     /// A simulator that plays a step again and writes a waveform.
     player: Option<PathBuf>,
+    /// The requests of the step, for the player.
     history: History,
-    /// Beats of each stream that the hardware has taken and the model has not.
-    ahead: Vec<VecDeque<StreamBeat>>,
+    /// Beats of each stream that the hardware has taken and the model has yet to take.
+    owed: Vec<VecDeque<StreamBeat>>,
     results: Vec<Results>,
     /// Clocks since the last start or reset.
     cycle: u64,
     busy: bool,
     model_busy: bool,
+    /// Clocks in which the hardware went on after the model's end.
+    alone: u64,
     /// Whether one of them may still be in reset; its registers mean nothing then.
     resetting: bool,
     /// Whether the last step ended with an error: its counters mean nothing then.
@@ -102,13 +106,14 @@ impl LockStep {
             hardware,
             model,
             config: *config,
+            history: History::new(player.is_some()),
             player,
-            history: History::default(),
-            ahead: inputs,
+            owed: inputs,
             results: outputs,
             cycle: 0,
             busy: false,
             model_busy: false,
+            alone: 0,
             resetting: false,
             failed: false,
             nan: false,
@@ -135,18 +140,19 @@ impl LockStep {
 
     /// Forgets the beats of a step that has ended, or was reset.
     fn forget_beats(&mut self) {
-        self.ahead.iter_mut().for_each(VecDeque::clear);
+        self.owed.iter_mut().for_each(VecDeque::clear);
         self.results.fill_with(Results::default);
+        self.alone = 0;
         self.nan = false;
     }
 
     /// Lets the model run on the beats that the hardware has taken.
     fn run_model(&mut self, clocks: u32) -> Result<(), ExternalError> {
-        let beats = self.ahead.iter().map(|beats| beats.iter().take(OFFERED_BEATS).copied());
+        let beats = self.owed.iter().map(|beats| beats.iter().take(OFFERED_BEATS).copied());
         let beats = beats.map(Iterator::collect).collect();
         let offer = Offer { beats, space: vec![SPACE; self.results.len()] };
         let clocked = self.model.run(clocks, &offer)?;
-        for (beats, taken) in self.ahead.iter_mut().zip(&clocked.taken) {
+        for (beats, taken) in self.owed.iter_mut().zip(&clocked.taken) {
             beats.drain(..*taken);
         }
         for (results, sent) in self.results.iter_mut().zip(clocked.sent) {
@@ -178,17 +184,21 @@ impl LockStep {
         Ok(())
     }
 
-    /// Lets the model end its step, then compares what a step leaves.
-    fn compare_step(&mut self) -> Result<(), ExternalError> {
+    /// Lets the model end its step.
+    fn catch_up(&mut self) -> Result<(), ExternalError> {
         let mut clocks = 0;
-        while self.model_busy && clocks < CATCH_UP_CLOCKS {
+        while self.model_busy && clocks < APART_CLOCKS {
             self.run_model(CATCH_UP_BATCH)?;
-            clocks += CATCH_UP_BATCH;
+            clocks += u64::from(CATCH_UP_BATCH);
         }
-        if self.model_busy {
-            return self.differs(DifferencePlace::End, self.cycle, [1, 0]);
+        match self.model_busy {
+            true => self.differs(DifferencePlace::End, self.cycle, [1, 0]),
+            false => self.compare_results(),
         }
-        self.compare_results()?;
+    }
+
+    /// Compares the registers and the numbers of results that a step leaves.
+    fn compare_step(&mut self) -> Result<(), ExternalError> {
         self.compare_registers(&[ERROR, ERROR_DETAIL])?;
         self.failed = self.model.read(ERROR.offset)? != 0;
         if self.failed {
@@ -256,7 +266,7 @@ impl ExternalAccelerator for LockStep {
             self.resetting = true;
             self.cycle = 0;
         }
-        self.history.write(offset, value);
+        self.history.write(offset, value, self.busy && !starts);
         self.hardware.write(offset, value)?;
         self.model.write(offset, value)
     }
@@ -264,13 +274,14 @@ impl ExternalAccelerator for LockStep {
     fn run(&mut self, limit: u32, offer: &Offer) -> Result<Clocked, ExternalError> {
         let clocked = self.hardware.run(limit, offer)?;
         self.history.run(&clocked, offer);
-        for ((ahead, beats), taken) in self.ahead.iter_mut().zip(&offer.beats).zip(&clocked.taken) {
+        for ((ahead, beats), taken) in self.owed.iter_mut().zip(&offer.beats).zip(&clocked.taken) {
             ahead.extend(beats.iter().take(*taken));
         }
         for (stream, results) in self.results.iter_mut().enumerate() {
             let sent = clocked.sent.get(stream).into_iter().flatten();
             let clocks = clocked.sent_at.get(stream).map_or(&[][..], Vec::as_slice);
-            let clocks = clocks.iter().copied().chain(std::iter::repeat(clocked.clocks));
+            let clocks =
+                clocks.iter().copied().chain(std::iter::repeat(clocked.clocks.saturating_sub(1)));
             let dated = sent.zip(clocks).map(|(beat, at)| (*beat, self.cycle + u64::from(at)));
             results.hardware.extend(dated);
         }
@@ -278,6 +289,17 @@ impl ExternalAccelerator for LockStep {
         self.run_model(clocked.clocks)?;
         self.compare_results()?;
         let ended = self.busy && !clocked.busy;
+        if ended || (self.busy && clocked.interrupt) {
+            // Nobody acknowledges the hardware's interrupt before the model has raised its own.
+            self.catch_up()?;
+        }
+        let waits_for_space = offer.space.contains(&0);
+        if self.busy && !self.model_busy && !waits_for_space {
+            self.alone += u64::from(clocked.clocks);
+        }
+        if self.alone > APART_CLOCKS {
+            return self.differs(DifferencePlace::End, self.cycle, [0, 1]);
+        }
         self.busy = clocked.busy;
         if ended {
             self.compare_step()?;

@@ -178,7 +178,7 @@ pub(crate) fn run(
     }
     match dead {
         Some(reason) => {
-            let next = "serve the board again, with a simulator that runs";
+            let next = "serve the board again; a new simulator starts with it";
             Err(Failure::new(Cause::Hardware, reason).next(next))
         }
         None => Ok(Verdict::Done),

@@ -160,6 +160,9 @@ pub(crate) fn run(
         .accelerator
         .set_shapes(&folder.shapes)
         .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters));
+    if stepped.is_ok() {
+        opened.alive()?;
+    }
     let report = match stepped {
         Ok(_) if interrupt.is_set() => return Ok(Verdict::Interrupted),
         Ok(report) => report,

@@ -3,12 +3,14 @@
 
 use std::io::Write;
 
+use bitstream_model::Direction;
 use bitstream_model::interface::profile::FLOAT;
 use serde_json::json;
 
 use super::cells::{self, Cell};
 use super::trial::{Bench, CellResult};
 use super::{FaultsArgs, try_all};
+use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
@@ -40,8 +42,9 @@ impl Pair {
     /// The kind of fault, the direction of its channel and the diagnoses.
     fn row(&self) -> [&'static str; 4] {
         let way = match self.cell.channel() {
-            Some((_, bitstream_model::Direction::S2mm)) => "S2MM",
-            _ => "MM2S",
+            Some((_, Direction::S2mm)) => "S2MM",
+            Some((_, Direction::Mm2s)) => "MM2S",
+            None => "any",
         };
         let cause = |found: &CellResult| found.cause.unwrap_or("none");
         [self.cell.kind.name(), way, cause(&self.model), cause(&self.hardware)]
@@ -63,6 +66,8 @@ pub(super) fn run(
         }
         return Ok(Verdict::Done);
     }
+    // A simulator that cannot be used is refused here, with the reason, and not cell by cell.
+    board::emulated_board(bench.config, &common.accelerator)?;
     let of_model = try_all(&bench, cells.clone());
     let bench = bench.with(common.accelerator.clone());
     let of_hardware = try_all(&bench, cells);

@@ -160,6 +160,7 @@ fn take_steps(
     while course.done < args.steps && !interrupt.is_set() {
         let row = step(course.done + 1, parameters, &mut opened.accelerator, scene)
             .map_err(|error| args.faults.failure(opened, parameters, error))?;
+        opened.alive()?;
         let Some(row) = row else { break };
         course.done += 1;
         course.retries += u64::from(row.report.retries);

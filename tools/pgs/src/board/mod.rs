@@ -1,8 +1,9 @@
 //! Opens the board of the command line, and describes it.
 
+mod accelerator;
+
 use std::io::{self, Write};
 
-use bitstream_model::external::{ExternalAccelerator, ExternalError, LockStep, SimulatorProcess};
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
@@ -14,7 +15,9 @@ use zynq_pgs::{
     StepParameters,
 };
 
-use crate::common::{AcceleratorChoice, BoardName, CommonArgs};
+use self::accelerator::dead;
+pub(crate) use self::accelerator::{emulated_board, external_accelerator};
+use crate::common::{BoardName, CommonArgs};
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
@@ -105,45 +108,6 @@ pub(crate) struct ChosenBoard {
     pub(crate) reason: String,
 }
 
-/// Starts the accelerator that was chosen for a board that is built as `config` says, and makes
-/// `config` treat subnormal numbers as it does; none for the built-in model.
-pub(crate) fn external_accelerator(
-    config: &mut BoardConfig,
-    accelerator: &AcceleratorChoice,
-) -> Result<Option<Box<dyn ExternalAccelerator>>, Failure> {
-    let Some((path, with_model)) = accelerator.simulator() else { return Ok(None) };
-    let simulator = SimulatorProcess::start_for(config, path).map_err(|error| {
-        let next = match error {
-            ExternalError::Profile { .. } => "leave out --profile, or --accelerator".to_owned(),
-            ExternalError::Hazards { simulator, .. } => {
-                format!("add --hazards {simulator}, or build the simulator with --hazards")
-            }
-            _ => return Failure::input(error),
-        };
-        Failure::input(error).next(next)
-    })?;
-    Ok(Some(match with_model {
-        true => {
-            let player = Some(path.to_owned());
-            let both = LockStep::new(config, Box::new(simulator), player).map_err(not_built)?;
-            Box::new(both)
-        }
-        false => Box::new(simulator),
-    }))
-}
-
-/// Builds an emulated board with the accelerator that was chosen.
-pub(crate) fn emulated_board(
-    mut config: BoardConfig,
-    accelerator: &AcceleratorChoice,
-) -> Result<EmulatedBoard, Failure> {
-    match external_accelerator(&mut config, accelerator)? {
-        Some(external) => EmulatedBoard::with_accelerator(config, external),
-        None => EmulatedBoard::new(config),
-    }
-    .map_err(not_built)
-}
-
 /// Chooses a board. `given` is an option of the command line that only an emulated board has.
 pub(crate) fn find(
     common: &CommonArgs,
@@ -229,13 +193,6 @@ pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<OpenBoard, 
     Ok(OpenBoard { accelerator, observer, injected: None, reason })
 }
 
-/// The failure for an external accelerator that does not answer any more.
-fn dead(observer: Option<&EmulatedBoard>) -> Option<Failure> {
-    let reason = observer?.accelerator_error()?;
-    let next = "no body was changed, and the next command starts a new simulator";
-    Some(Failure::new(Cause::Hardware, reason).next(next))
-}
-
 /// The failure for a board that is missing or cannot be opened.
 pub(crate) fn unusable(error: zynq_pgs::Error) -> Failure {
     let general =
@@ -289,6 +246,14 @@ impl OpenBoard {
             Some(injected) => failure.planned(&injected.text(), injected.to_json()),
             None => failure,
         }
+    }
+
+    /// Whether the accelerator still answers, as the model does if that runs beside it.
+    ///
+    /// The last registers of a step can be read from one that has died: they are all ones, and the
+    /// driver takes these for counters.
+    pub(crate) fn alive(&self) -> Result<(), Failure> {
+        dead(self.observer.as_ref()).map_or(Ok(()), Err)
     }
 
     /// Gives the board the faults of `planned`, effective from its first step.
