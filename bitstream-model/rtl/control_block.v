@@ -113,7 +113,8 @@ module control_block (
 
   always @(posedge clk) begin
     // The memory that the arguments need, and their checks, in registers: settled long before a start.
-    bytes_bodies     <= bodies * BYTES_PER_BODY;
+    // More bodies than 18 bits can tell are refused before their bytes matter.
+    bytes_bodies     <= bodies[17:0] * BYTES_PER_BODY;
     bytes_collisions <= collisions * BYTES_PER_COLLISION;
     bytes            <= bytes_bodies + bytes_collisions;
     bodies_wrong     <= (bodies == 32'd0) | (bodies > BODIES_MAX);

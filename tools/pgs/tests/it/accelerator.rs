@@ -78,8 +78,10 @@ fn a_board_is_not_served_without_its_simulator() {
 #[test]
 fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
     let folder = tempfile::tempdir().expect("a folder");
-    // It answers the first request with the identification of an accelerator.
-    let ends = program(folder.path(), "#!/bin/sh\nprintf 1SGP\n");
+    // It answers the first two requests, with the identification and the features of an interlocked
+    // accelerator.
+    let two_requests = "printf '1SGP\\002\\000\\000\\000'\nhead -c 24 >/dev/null\n";
+    let ends = program(folder.path(), &format!("#!/bin/sh\n{two_requests}"));
     let mut command = serve(folder.path(), &ends, &[]);
     let server = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut server = Tied(server);
