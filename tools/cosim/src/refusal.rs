@@ -24,7 +24,7 @@ pub struct Refusal {
 /// The index of a collision or a body that is wrong.
 const WRONG: usize = 3;
 
-/// Five bodies in a row, of which the last is static, and a collision of each with its neighbour.
+/// Five bodies in a row, the last one static, and a collision of each with its neighbour.
 fn scene() -> Scene {
     let one = 1.0_f32.to_bits();
     let moves = Shape { inverse_mass: one, inverse_inertia: one };

@@ -21,7 +21,7 @@ pub struct Difference {
     pub hardware: u32,
     /// The waveform of the cycles before it.
     pub waveform: Option<PathBuf>,
-    /// Why there is no waveform, where one was asked for.
+    /// The reason for a missing waveform.
     pub no_waveform: Option<String>,
 }
 

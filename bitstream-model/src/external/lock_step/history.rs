@@ -62,7 +62,7 @@ impl History {
         self.add(Request::Read(offset));
     }
 
-    /// A write; a busy accelerator takes those of its interrupt alone.
+    /// A write. A busy accelerator takes writes of its interrupt enables alone.
     pub(super) fn write(&mut self, offset: u32, value: u32, busy: bool) {
         if offset == RESET.offset && reset::RESET.is_set(value) {
             self.registers.clear();

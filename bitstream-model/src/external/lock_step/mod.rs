@@ -290,7 +290,7 @@ impl ExternalAccelerator for LockStep {
         self.compare_results()?;
         let ended = self.busy && !clocked.busy;
         if ended || (self.busy && clocked.interrupt) {
-            // Nobody acknowledges the hardware's interrupt before the model has raised its own.
+            // The model raises its interrupt before the driver acknowledges the hardware's.
             self.catch_up()?;
         }
         let waits_for_space = offer.space.contains(&0);
