@@ -111,12 +111,14 @@ pub(crate) struct Feed<'a> {
     pub(crate) clocks: u64,
     /// Whether the step is under way.
     pub(crate) busy: bool,
+    /// The level of the interrupt.
+    pub(crate) interrupt: bool,
 }
 
 impl<'a> Feed<'a> {
     pub(crate) fn new(beats: &'a Beats) -> Self {
         let results = Default::default();
-        Self { beats, at: [0; STREAMS], results, clocks: 0, busy: true }
+        Self { beats, at: [0; STREAMS], results, clocks: 0, busy: true, interrupt: false }
     }
 
     /// Exchanges beats with the accelerator once.
@@ -137,6 +139,7 @@ impl<'a> Feed<'a> {
             results.extend(sent);
         }
         self.busy = clocked.busy;
+        self.interrupt = clocked.interrupt;
         self.clocks += u64::from(clocked.clocks);
         Ok(())
     }
