@@ -28,9 +28,8 @@ use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl};
 
 /// Beats of each stream that are offered at once.
 const OFFERED_BEATS: usize = 64;
-/// Clocks that the accelerator runs before the DMAs move beats again. A simulated clock takes longer than
-/// an exchange with the simulator's process.
-const BATCH_CLOCKS: u64 = 8;
+/// Clocks that the accelerator runs before the DMAs move beats again.
+const BATCH_CLOCKS: u64 = 64;
 /// Most clocks of its reset.
 const RESET_CLOCKS: u32 = 8192;
 /// Clocks between two looks at its reset.
