@@ -239,7 +239,7 @@ module control_block (
     end
   end
 
-  // ---- Reads: each kind of register is selected on its own, and those that are not asked for give 0
+  // ---- Reads: each kind of register has a selection of its own, which gives 0 for other addresses
 
   reg [31:0] inverse_mass_read, inverse_inertia_read;
   reg [31:0] argument_read, state_read, capability_read, result_read;

@@ -55,11 +55,12 @@ recorded=(tests/golden/*/)
 simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
 if [ "$mode" = steps ]; then
 	if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile*/); fi
-	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
 	attend "$built/pgs" check --board emulated --subnormals flush --accelerator "rtl:${simulators[0]}"
 	attend "$built/pgs" faults --accelerator "rtl:${simulators[0]}"
 	attend "$built/cosim" random --simulator "${simulators[0]}" --cases 500 --seed 5000000
 	attend "$built/cosim" registers --simulator "${simulators[0]}" --cases 500
+	# The longest part comes last.
+	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
 	exit
 fi
 if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile10*/); fi

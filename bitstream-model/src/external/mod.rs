@@ -11,7 +11,7 @@ mod serve;
 pub use lock_step::{Difference, DifferencePlace, LockStep, same_number};
 pub use model::ModelAccelerator;
 pub use process::SimulatorProcess;
-pub use serve::{ServeError, serve};
+pub use serve::{RequestError, serve};
 
 pub use crate::stream::StreamBeat;
 

@@ -9,10 +9,10 @@ use super::process::{
 use super::{ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use pgs_interface::record::Beat;
 
-/// Why an accelerator is served no longer, other than that its client has left.
+/// The reason for which a request has no answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ServeError {
+pub enum RequestError {
     /// The pipes of the client.
     #[error("a request cannot be read, or its answer not be written")]
     Pipe(#[from] io::Error),
@@ -30,12 +30,12 @@ pub enum ServeError {
 /// Serves an accelerator until the requests end.
 ///
 /// # Errors
-/// [`ServeError`] where a request cannot be answered.
+/// [`RequestError`] where a request cannot be answered.
 pub fn serve(
     accelerator: &mut dyn ExternalAccelerator,
     requests: &mut dyn Read,
     answers: &mut dyn Write,
-) -> Result<(), ServeError> {
+) -> Result<(), RequestError> {
     loop {
         let mut first_byte = [0];
         if requests.read(&mut first_byte)? == 0 {
@@ -50,7 +50,7 @@ pub fn serve(
             }
             RUN => run(accelerator, first, requests)?,
             RECORD => vec![0],
-            found => return Err(ServeError::Request { found }),
+            found => return Err(RequestError::Request { found }),
         };
         let bytes: Vec<u8> = answer.into_iter().flat_map(u32::to_le_bytes).collect();
         answers.write_all(&bytes)?;
@@ -72,7 +72,7 @@ fn run(
     accelerator: &mut dyn ExternalAccelerator,
     limit: u32,
     requests: &mut dyn Read,
-) -> Result<Vec<u32>, ServeError> {
+) -> Result<Vec<u32>, RequestError> {
     let offered: [u32; STREAMS] = words(requests)?;
     let space: [u32; STREAMS] = words(requests)?;
     let mut offer = Offer { space: space.map(|space| space as usize).to_vec(), beats: Vec::new() };

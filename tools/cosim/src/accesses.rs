@@ -14,7 +14,7 @@ use crate::random::case;
 
 /// Accesses at rest.
 const AT_REST: u32 = 8;
-/// Clocks of a step that is left alone at most.
+/// Most clocks of a step.
 const CLOCKS_MAX: u64 = 10_000_000;
 
 /// Makes the accesses of a seed; whether the step has ended. The accelerator is one in lock step with the

@@ -26,8 +26,8 @@ use pgs_interface::control::{
 };
 use pgs_interface::register::Register;
 
-/// Clocks that one of them may need after the other for the same step, while it does not wait for a
-/// stream.
+/// Most clocks between the end of a step in the hardware and in the model. Clocks in which the hardware
+/// waits for space do not count.
 const APART_CLOCKS: u64 = 100_000;
 /// Clocks that the model catches up at once.
 const CATCH_UP_BATCH: u32 = 64;
@@ -71,7 +71,7 @@ pub struct LockStep {
     model_busy: bool,
     /// Clocks in which the hardware went on after the model's end.
     alone: u64,
-    /// Whether one of them may still be in reset; its registers mean nothing then.
+    /// Whether the hardware or the model may still be in reset, in which its registers mean nothing.
     resetting: bool,
     /// Whether the last step ended with an error: its counters mean nothing then.
     failed: bool,
@@ -274,8 +274,8 @@ impl ExternalAccelerator for LockStep {
     fn run(&mut self, limit: u32, offer: &Offer) -> Result<Clocked, ExternalError> {
         let clocked = self.hardware.run(limit, offer)?;
         self.history.run(&clocked, offer);
-        for ((ahead, beats), taken) in self.owed.iter_mut().zip(&offer.beats).zip(&clocked.taken) {
-            ahead.extend(beats.iter().take(*taken));
+        for ((owed, beats), taken) in self.owed.iter_mut().zip(&offer.beats).zip(&clocked.taken) {
+            owed.extend(beats.iter().take(*taken));
         }
         for (stream, results) in self.results.iter_mut().enumerate() {
             let sent = clocked.sent.get(stream).into_iter().flatten();

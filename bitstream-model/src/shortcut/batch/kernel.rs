@@ -175,7 +175,7 @@ fn tested(block: &Block, bit: u32) -> Mask {
 ///
 /// # Safety
 ///
-/// The rows exist, and no other thread writes them at the same time.
+/// `rows` are indices into the rows at `bodies`, and no other thread writes these rows at the same time.
 #[inline(always)]
 unsafe fn side<A: Arithmetic>(
     arithmetic: A,
@@ -185,9 +185,9 @@ unsafe fn side<A: Arithmetic>(
 ) -> Side<A> {
     let (mut linear, mut angular) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
     for (lane, row) in rows.iter().enumerate() {
-        // SAFETY: the caller promises that the row exists.
+        // SAFETY: the caller promises that the index lies within the rows at `bodies`.
         let body = unsafe { bodies.add(*row as usize) };
-        // SAFETY: the caller promises that it can be read.
+        // SAFETY: the row exists, and the caller promises that no other thread writes it.
         [linear[lane], angular[lane]] = unsafe { *body };
     }
     let [x, y, z, m] = instructions.columns(linear).map(|numbers| arithmetic.of(numbers));
@@ -199,7 +199,8 @@ unsafe fn side<A: Arithmetic>(
 ///
 /// # Safety
 ///
-/// The rows exist, and no other thread accesses them at the same time.
+/// `rows` are indices into the rows at `bodies`, and no other thread accesses these rows at the same
+/// time.
 #[inline(always)]
 unsafe fn put_side<A: Arithmetic>(
     instructions: impl Instructions,
@@ -211,9 +212,9 @@ unsafe fn put_side<A: Arithmetic>(
     let linear = instructions.quads([x, y, z, side.m].map(Numbers::lanes));
     let angular = instructions.quads([p, q, r, side.k].map(Numbers::lanes));
     for (lane, row) in rows.iter().enumerate() {
-        // SAFETY: the caller promises that the row exists.
+        // SAFETY: the caller promises that the index lies within the rows at `bodies`.
         let body = unsafe { bodies.add(*row as usize) };
-        // SAFETY: the caller promises that it can be written.
+        // SAFETY: the row exists, and the caller promises that no other thread accesses it.
         unsafe { *body = [linear[lane], angular[lane]] };
     }
 }
@@ -222,7 +223,7 @@ unsafe fn put_side<A: Arithmetic>(
 ///
 /// # Safety
 ///
-/// The rows of the block and the spare one exist. While this runs, no other thread writes the block's
+/// The block's rows and the spare one are indices into the rows at `bodies`. While this runs, no other thread writes the block's
 /// rows, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
 pub(crate) unsafe fn solve<A: Arithmetic>(
@@ -235,9 +236,9 @@ pub(crate) unsafe fn solve<A: Arithmetic>(
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = arithmetic.of(counts);
-    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
+    // SAFETY: the caller promises that the block's rows lie at `bodies`, and no other thread writes them.
     let mut a = unsafe { side(arithmetic, instructions, bodies, &block.rows[0]) };
-    // SAFETY: the caller promises that the rows exist and that no other thread writes them.
+    // SAFETY: the caller promises that the block's rows lie at `bodies`, and no other thread writes them.
     let mut b = unsafe { side(arithmetic, instructions, bodies, &block.rows[1]) };
     if pass.stage.contact {
         contact(arithmetic, pass, block, counts, &mut a, &mut b);
@@ -251,8 +252,8 @@ pub(crate) unsafe fn solve<A: Arithmetic>(
                 *row = if kind & kind::MOVES[each] == 0 { pass.spare } else { *row };
             }
         }
-        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that no other
-        // thread accesses them.
+        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that they lie at
+        // `bodies`, and that no other thread accesses them.
         unsafe { put_side(instructions, bodies, &written, side) };
     }
 }
