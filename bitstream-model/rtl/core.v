@@ -67,8 +67,6 @@ module core (
   localparam COLLISION      = COLLISION_BITS;  // bits of a collision's number
   localparam SHAPE          = 6;               // bits of a shape's number
 
-  wire run = busy & ~error;
-
   // Passes of the step; without collisions there are none.
   reg [8:0] contact_passes, friction_passes, passes;
   reg       no_contacts;
@@ -125,7 +123,7 @@ module core (
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
       receiver #(.CHANNEL(k)) stream (
-        .clk(clk), .reset(reset), .start(start), .clear(clear), .run(run),
+        .clk(clk), .stop(reset | error), .start(start), .clear(clear),
         .bodies(bodies), .collisions(collisions), .passes(passes),
         .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
         .tvalid(s_tvalid[k]), .tready(s_tready[k]),
@@ -414,7 +412,7 @@ module core (
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_sender
       sender #(.ADDRESS(10)) stream (
-        .clk(clk), .clear(clear), .run(run), .bodies(bodies),
+        .clk(clk), .clear(clear), .stop(error), .bodies(bodies),
         .enters(enters), .has_room(room[k]), .push(result_valid), .row(result[k]),
         .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),
         .finished(sender_finished[k]), .sum(sent[k])

@@ -14,10 +14,9 @@ module receiver #(
   parameter CHANNEL = 0
 ) (
   input  wire         clk,
-  input  wire         reset,
+  input  wire         stop,             // reset, or the step has an error: no more beats are taken
   input  wire         start,            // a step begins; the arguments stay as they are
   input  wire         clear,            // reset or start
-  input  wire         run,              // beats are taken
   input  wire [19:0]  bodies,
   input  wire [19:0]  collisions,
   input  wire [8:0]   passes,           // 0 without collisions
@@ -64,6 +63,7 @@ module receiver #(
   end
 
   reg [1:0]  segment;
+  reg        open;           // segment != FINISHED
   reg [8:0]  passes_left;
   reg        pass_is_last;
   reg [20:0] left;           // beats of the packet that have not come
@@ -74,7 +74,7 @@ module receiver #(
   wire has_room;
   wire accepted = tvalid & tready;
   wire in_pass  = segment == PASSES;
-  assign tready           = run & (segment != FINISHED) & has_room;
+  assign tready           = open & has_room;
   assign collision_begins = accepted & in_pass & ~second;
 
   // The segment after this one.
@@ -88,6 +88,7 @@ module receiver #(
   task begin_packet(input [1:0] of);
     begin
       segment      <= of;
+      open         <= of != FINISHED;
       beat         <= 21'd0;
       second       <= 1'b0;
       left         <= (of == PASSES) ? pass_beats : body_beats;
@@ -97,8 +98,9 @@ module receiver #(
 
   always @(posedge clk) begin
     error <= 1'b0;
-    if (reset) begin
+    if (stop) begin
       segment <= FINISHED;
+      open    <= 1'b0;
     end else if (start) begin
       begin_packet(first_segment);
       passes_left  <= passes;

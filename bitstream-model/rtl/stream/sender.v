@@ -10,7 +10,7 @@ module sender #(
 ) (
   input  wire         clk,
   input  wire         clear,    // reset, or a step begins
-  input  wire         run,      // rows leave
+  input  wire         stop,     // the step has an error: no more rows leave
   input  wire [19:0]  bodies,
 
   input  wire         enters,   // a body enters the integration
@@ -29,13 +29,10 @@ module sender #(
   localparam [ADDRESS:0] CREDITS = (1 << ADDRESS) - 4;
 
   reg [ADDRESS:0]  credits;
-  reg [19:0]       rows_left, beats_left;
+  reg [19:0]       rows_left;
   reg              row_is_last, one_row;
   reg              taken, given;     // a credit, in the cycle before
-  wire             some;
   wire             leaves = tvalid & tready;
-
-  assign tvalid = run & some;
 
   always @(posedge clk) begin
     one_row <= bodies == 20'd1;
@@ -46,7 +43,6 @@ module sender #(
       has_room    <= 1'b1;
       rows_left   <= bodies;
       row_is_last <= one_row;
-      beats_left  <= bodies;
       finished    <= 1'b0;
     end else begin
       if (taken & ~given) credits <= credits - 1'b1;
@@ -57,16 +53,13 @@ module sender #(
         rows_left   <= rows_left - 20'd1;
         row_is_last <= rows_left == 20'd2;
       end
-      if (leaves) begin
-        beats_left <= beats_left - 20'd1;
-        finished   <= beats_left == 20'd1;
-      end
+      finished <= finished | (leaves & tlast);
     end
   end
 
   block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
-    .clk(clk), .clear(clear), .push(push), .in({row_is_last, row}), .pop(leaves),
-    .head({tlast, tdata}), .some(some)
+    .clk(clk), .clear(clear | stop), .push(push), .in({row_is_last, row}), .pop(leaves),
+    .head({tlast, tdata}), .some(tvalid)
   );
 
   word_sum words (
