@@ -265,7 +265,13 @@ impl Device {
             port.ensure_running(&*self.platform)?;
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        self.control.set_arguments(count(plan.bodies), count(plan.collisions), parameters);
+        let extensions = self.capabilities.extensions;
+        self.control.set_arguments(
+            count(plan.bodies),
+            count(plan.collisions),
+            parameters,
+            extensions,
+        );
         // Buffers and descriptors must be visible before the first doorbell.
         release_to_device();
         Ok(())

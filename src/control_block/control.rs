@@ -5,8 +5,9 @@ use std::time::Duration;
 use pgs_interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, FLAGS, FRICTION,
     FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, IER, POSITION_COEFFICIENT,
-    POSITION_DRIFT, RESET, TIME_STEP, ap_ctrl, flags, irq, reset,
+    POSITION_DRIFT, RESET, SPIN_DAMPING, TIME_STEP, ap_ctrl, flags, irq, reset,
 };
+use pgs_interface::extension::Extensions;
 use pgs_interface::register::Register;
 
 use super::ControlError;
@@ -16,8 +17,8 @@ use crate::scene::StepParameters;
 /// How long the accelerator may take to reset.
 const RESET_LIMIT: Duration = Duration::from_millis(10);
 
-/// Number of arguments.
-const ARGUMENTS: usize = 13;
+/// Number of arguments, extensions included.
+const ARGUMENTS: usize = 14;
 
 /// The arguments of a step: register and value.
 fn arguments(
@@ -39,6 +40,7 @@ fn arguments(
         (GRAVITY_X, parameters.gravity[0].to_bits()),
         (GRAVITY_Y, parameters.gravity[1].to_bits()),
         (GRAVITY_Z, parameters.gravity[2].to_bits()),
+        (SPIN_DAMPING, parameters.spin_damping.to_bits()),
     ]
 }
 
@@ -66,17 +68,20 @@ impl Control {
         self.window.write32(offset, value);
     }
 
-    /// Writes the arguments that differ from the values in the registers.
+    /// Writes the arguments that differ from the values in the registers. A board without an
+    /// extension has no register for its argument.
     pub(crate) fn set_arguments(
         &mut self,
         bodies: u32,
         collisions: u32,
         parameters: &StepParameters,
+        extensions: Extensions,
     ) {
         for (place, (register, value)) in
             arguments(bodies, collisions, parameters).into_iter().enumerate()
         {
-            if self.written[place] != Some(value) {
+            let exists = register.offset != SPIN_DAMPING.offset || extensions.spin_damping;
+            if exists && self.written[place] != Some(value) {
                 self.write(register.offset, value);
                 self.written[place] = Some(value);
             }
@@ -125,12 +130,21 @@ mod tests {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let parameters = StepParameters::default();
-        control.set_arguments(2, 1, &parameters);
+        control.set_arguments(2, 1, &parameters, Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), ARGUMENTS);
         assert_eq!(registers.with(|state| state.values[&0x38]), (1.0f32 / 60.0).to_bits());
         assert_eq!(registers.with(|state| state.values[&0x30]), 1);
-        control.set_arguments(2, 7, &parameters);
+        control.set_arguments(2, 7, &parameters, Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes[ARGUMENTS..].to_vec()), [(0x18, 7)]);
+    }
+
+    #[test]
+    fn a_board_of_version_1_1_gets_no_argument_that_it_lacks() {
+        let registers = FakeRegisters::default();
+        let mut control = Control::new(registers.window(RegisterMap::Control));
+        control.set_arguments(2, 1, &StepParameters::default(), Extensions::NONE);
+        assert_eq!(registers.with(|state| state.writes.len()), 13);
+        assert!(registers.with(|state| state.writes.iter().all(|(offset, _)| *offset <= 0x70)));
     }
 
     #[test]
@@ -138,13 +152,13 @@ mod tests {
         let registers = FakeRegisters::default();
         registers.with(|state| state.kept_bits.insert(0x1C0, 0));
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(2, 1, &StepParameters::default());
+        control.set_arguments(2, 1, &StepParameters::default(), Extensions::ALL);
         control.reset(&FakePlatform::default()).expect("out of reset");
         assert_eq!(
             registers.with(|state| state.writes[ARGUMENTS..].to_vec()),
             [(0x1C0, 1), (0x04, 1), (0x08, 4)]
         );
-        control.set_arguments(2, 1, &StepParameters::default());
+        control.set_arguments(2, 1, &StepParameters::default(), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), 2 * ARGUMENTS + 3);
     }
 

@@ -9,6 +9,7 @@ use pgs_interface::control::{
     VERSION_MAJOR, WINDOW, WINDOW_CAPACITY, channels, depth, dma, features, issue,
     memory_per_record, numbers, version, window as window_units, window_capacity,
 };
+use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Flow, Geometry, Inertia, Profile, Variant, Window as Live};
 use pgs_interface::record::live;
@@ -25,6 +26,8 @@ pub struct Capabilities {
     pub variant: Variant,
     /// Interface version, major and minor.
     pub version: (u32, u32),
+    /// Its abilities beyond interface version 1.1.
+    pub extensions: Extensions,
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
     pub interlocked: bool,
     /// Whether words received and sent are summed, which detects a corrupted beat.
@@ -192,6 +195,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     Ok(Capabilities {
         variant,
         version: (major, minor),
+        extensions: Extensions::reported(able),
         interlocked: features::INTERLOCKED.is_set(able),
         checksums: features::CHECKSUMS.is_set(able),
         flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
@@ -308,7 +312,7 @@ pub(crate) mod fake {
         registers.with(|state| {
             state.values.extend([
                 (0x100, 0x5047_5331),
-                (0x104, 0x0001_0001),
+                (0x104, 0x0001_0002),
                 (0x108, 1),
                 (0x10C, 0xB),
                 (0x110, 0x0404),

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use pgs_interface::profile::solver;
+
 use super::Order;
 
 /// Parameters of a step. The default is Bullet's.
@@ -104,6 +106,11 @@ pub struct StepParameters {
     pub friction: f32,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
+    /// Share of the spin about the normal that every friction pass takes from both bodies of a
+    /// collision, from 0 to 1, where one of them is static or lies on the other. 0 is off; 0.1 is
+    /// Bullet's, and the only value of a bitstream without the
+    /// [extension](pgs_interface::extension::Extensions::spin_damping).
+    pub spin_damping: f32,
     /// Gravity, m/s², world frame; only a step with integration uses it.
     pub gravity: [f32; 3],
     /// Passes of the contact solver over all collisions.
@@ -170,6 +177,7 @@ impl Default for StepParameters {
             position_coefficient: 0.2,
             friction: 0.7,
             angular_damping: 0.99,
+            spin_damping: solver::SPIN_DAMPING,
             gravity: [0.0, -9.8, 0.0],
             contact_iterations: 4,
             friction_iterations: 4,

@@ -8,6 +8,20 @@ use pgs_interface::number::StreamFormat;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Excess {
+    /// A parameter that takes an extension of the interface.
+    #[error(
+        "the {parameter} is {found}, and this bitstream knows {known} only: give {known}, or load one \
+         of interface version 1.2 with this extension"
+    )]
+    Extension {
+        /// The parameter.
+        parameter: &'static str,
+        /// Its value.
+        found: f32,
+        /// The value without the extension.
+        known: f32,
+    },
+
     /// More bodies than the bitstream has room for, whatever the memory.
     #[error(
         "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load another"

@@ -1,7 +1,9 @@
 //! Refuses step parameters outside their range.
 
+use pgs_interface::extension::Extensions;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
+use pgs_interface::profile::solver::SPIN_DAMPING;
 
 use super::range::{computes_short, smallest_short};
 use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds};
@@ -21,8 +23,8 @@ pub(crate) fn check_parameters(
     let positive = |value: f32| value.is_normal() && value > 0.0;
     let [x, y, z] = parameters.gravity;
     let StepParameters { time_step, position_drift, position_coefficient, .. } = *parameters;
-    let StepParameters { friction, angular_damping, .. } = *parameters;
-    let share = (0.0..=1.0).contains(&angular_damping);
+    let StepParameters { friction, angular_damping, spin_damping, .. } = *parameters;
+    let share = |value: f32| (0.0..=1.0).contains(&value);
     let checks = [
         (TIME_STEP, time_step, positive(time_step), "a finite number of seconds above 0"),
         ("position drift", position_drift, finite(position_drift), "a finite number of metres"),
@@ -33,7 +35,8 @@ pub(crate) fn check_parameters(
             "a finite number",
         ),
         ("friction", friction, not_negative(friction), "a finite number of at least 0"),
-        ("angular damping", angular_damping, share, "a number from 0 to 1"),
+        ("angular damping", angular_damping, share(angular_damping), "a number from 0 to 1"),
+        ("spin damping", spin_damping, share(spin_damping), "a number from 0 to 1"),
         ("gravity in x", x, finite(x), "a finite number of m/s²"),
         ("gravity in y", y, finite(y), "a finite number of m/s²"),
         ("gravity in z", z, finite(z), "a finite number of m/s²"),
@@ -42,6 +45,11 @@ pub(crate) fn check_parameters(
         if !fits {
             return Err(InputError::Parameter { parameter, found, expected });
         }
+    }
+    if !limits.extensions.spin_damping && spin_damping.to_bits() != SPIN_DAMPING.to_bits() {
+        let (parameter, found) = ("spin damping", spin_damping);
+        let excess = Excess::Extension { parameter, found, known: SPIN_DAMPING };
+        return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
     }
     if computes_short(&limits.variant.numbers) {
         let (format, component) = (StreamFormat::Binary16, 0);
@@ -125,6 +133,7 @@ mod tests {
         refuses("angular damping", &NOT_FINITE, |parameters, value| {
             parameters.angular_damping = value;
         });
+        refuses("spin damping", &NOT_FINITE, |parameters, value| parameters.spin_damping = value);
         refuses("gravity in x", &NOT_FINITE, |parameters, value| parameters.gravity[0] = value);
         refuses("gravity in y", &NOT_FINITE, |parameters, value| parameters.gravity[1] = value);
         refuses("gravity in z", &NOT_FINITE, |parameters, value| parameters.gravity[2] = value);
@@ -147,8 +156,25 @@ mod tests {
         accepts(&[f32::MIN_POSITIVE, 1.0], |parameters, value| parameters.time_step = value);
         accepts(&[0.0, 5.0], |parameters, value| parameters.friction = value);
         accepts(&[0.0, 1.0], |parameters, value| parameters.angular_damping = value);
+        accepts(&[0.0, 1.0], |parameters, value| parameters.spin_damping = value);
         accepts(&[-1.0, 0.0], |parameters, value| parameters.position_drift = value);
         accepts(&[-1.0, 2.0], |parameters, value| parameters.position_coefficient = value);
+    }
+
+    #[test]
+    fn another_spin_damping_takes_the_extension() {
+        let old = Limits { extensions: Extensions::NONE, ..FLOAT };
+        let mut parameters = StepParameters::default();
+        assert_eq!(check_parameters(&parameters, &NEEDS, &old), Ok(()));
+        parameters.spin_damping = 0.0;
+        assert_eq!(checked(&parameters), Ok(()));
+        let refused = check_parameters(&parameters, &NEEDS, &old).expect_err("version 1.1");
+        assert_eq!(
+            refused.to_string(),
+            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one of \
+             interface version 1.2 with this extension (profiles that could: naive, float, half, \
+             mixed, windowed, windowed16)"
+        );
     }
 
     #[test]
@@ -191,11 +217,12 @@ mod tests {
     #[test]
     fn what_binary16_would_take_for_zero_is_refused_where_it_computes() {
         type Set = fn(&mut StepParameters, f32);
-        let sets: [(&str, Set); 5] = [
+        let sets: [(&str, Set); 6] = [
             ("position drift", |parameters, value| parameters.position_drift = -value),
             ("position coefficient", |parameters, value| parameters.position_coefficient = value),
             ("friction", |parameters, value| parameters.friction = value),
             ("angular damping", |parameters, value| parameters.angular_damping = value),
+            ("spin damping", |parameters, value| parameters.spin_damping = value),
             ("gravity in y", |parameters, value| parameters.gravity[1] = -value),
         ];
         let flush = Limits { flush_subnormals: true, ..HALF };

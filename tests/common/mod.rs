@@ -1,6 +1,9 @@
 //! Shares the parts of whole-step tests: opening a board, scenes, choosing an order, comparing bits.
 #![allow(dead_code, reason = "each test uses its part")]
 
+pub(crate) mod direct;
+pub(crate) mod random_scene;
+
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
 use zynq_pgs::{

@@ -75,7 +75,7 @@ fn a_board_as_it_should_be_passes_every_line() {
     let (report, board) = checked(BoardConfig::default());
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
-    assert_eq!(detail(&report, "interface version"), "1.1");
+    assert_eq!(detail(&report, "interface version"), "1.2");
     assert!(
         detail(&report, "capabilities")
             .starts_with("profile float, 4 + 4 streams of 128 bits, 275000 kHz")

@@ -124,6 +124,7 @@ fn control_registers_stand_at_their_published_offsets() {
             ("GRAVITY_X", 0x60),
             ("GRAVITY_Y", 0x68),
             ("GRAVITY_Z", 0x70),
+            ("SPIN_DAMPING", 0x78),
             ("IDENTIFICATION", 0x100),
             ("VERSION", 0x104),
             ("PROFILE", 0x108),
@@ -159,8 +160,8 @@ fn control_registers_stand_at_their_published_offsets() {
         ]
     );
     assert_eq!(control::IDENTIFICATION_VALUE.to_be_bytes(), *b"PGS1");
-    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 1));
-    assert_eq!(control::VERSION.reset, 0x0001_0001);
+    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 2));
+    assert_eq!(control::VERSION.reset, 0x0001_0002);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
     assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
     assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);
@@ -185,6 +186,7 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
     assert_eq!(control::features::IMPULSE_SUM.mask(), 1 << 3);
     assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 4);
+    assert_eq!(control::features::SPIN_DAMPING.mask(), 1 << 5);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,

@@ -12,6 +12,7 @@ mod vectors;
 
 mod cheapest_order;
 mod check;
+mod extensions;
 mod float_environment;
 mod interface;
 mod landing;

@@ -74,6 +74,8 @@ pub mod features {
     pub const IMPULSE_SUM: Field = Field::bit("impulse_sum", 3, Access::ReadOnly);
     /// Velocity records carry the world inverse inertia of their body.
     pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
+    /// [`SPIN_DAMPING`](super::SPIN_DAMPING) exists; without it the share is its reset value.
+    pub const SPIN_DAMPING: Field = Field::bit("spin_damping", 5, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -253,13 +255,23 @@ pub const GRAVITY_X: Register = argument("GRAVITY_X", 0x60);
 pub const GRAVITY_Y: Register = argument("GRAVITY_Y", 0x68);
 /// Gravity along z, m/s², f32.
 pub const GRAVITY_Z: Register = argument("GRAVITY_Z", 0x70);
+/// Share of the spin about the normal that one friction pass takes away, f32. Only in a bitstream
+/// with [`features::SPIN_DAMPING`]. Its value after a reset is the share of every other bitstream.
+pub const SPIN_DAMPING: Register = row(
+    "SPIN_DAMPING",
+    0x78,
+    Access::ReadWrite,
+    super::profile::solver::SPIN_DAMPING.to_bits(),
+    &[],
+    OURS,
+);
 
 /// "PGS1" as text, first letter in the most significant byte.
 pub const IDENTIFICATION_VALUE: u32 = 0x5047_5331;
 /// Major interface version of this module.
 pub const VERSION_MAJOR: u32 = 1;
 /// Minor interface version of this module.
-pub const VERSION_MINOR: u32 = 1;
+pub const VERSION_MINOR: u32 = 2;
 
 /// Always [`IDENTIFICATION_VALUE`].
 pub const IDENTIFICATION: Register =
@@ -285,6 +297,7 @@ pub const FEATURES: Register = read_only(
         features::FLUSH_SUBNORMALS,
         features::IMPULSE_SUM,
         features::WORLD_INERTIA,
+        features::SPIN_DAMPING,
     ],
 );
 /// Numbers of streams.
@@ -410,6 +423,7 @@ pub const REGISTERS: &[Register] = &[
     GRAVITY_X,
     GRAVITY_Y,
     GRAVITY_Z,
+    SPIN_DAMPING,
     IDENTIFICATION,
     VERSION,
     PROFILE,

@@ -8,6 +8,7 @@ pub mod address_map;
 pub mod axi_dma;
 pub mod control;
 pub mod descriptor;
+pub mod extension;
 pub mod message;
 pub mod number;
 pub mod profile;

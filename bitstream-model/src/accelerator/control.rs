@@ -9,10 +9,11 @@ use pgs_interface::control::{
     GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO,
     IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS,
     POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY,
-    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE, SUM_RECEIVED, SUM_SENT,
-    TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels,
-    depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
+    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE, SPIN_DAMPING,
+    SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY, WORK_CYCLES,
+    ap_ctrl, channels, depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
 };
+use pgs_interface::extension::Extensions;
 use pgs_interface::number::Numbers;
 use pgs_interface::profile::{Depth, Inertia, Window};
 
@@ -85,6 +86,7 @@ pub(super) enum Request {
 /// The register file.
 #[derive(Debug)]
 pub(super) struct Registers {
+    extensions: Extensions,
     arguments: [u32; ARGUMENT_WORDS],
     gie: bool,
     ier: u32,
@@ -97,7 +99,7 @@ pub(super) struct Registers {
     pub(super) counters: Counters,
 }
 
-/// Offsets of the arguments. `Registers::arguments` holds each at a quarter of its offset.
+/// Offsets of the arguments of every board. `Registers::arguments` holds each at a quarter of its offset.
 const ARGUMENTS: [u32; 13] = [
     BODIES.offset,
     COLLISIONS.offset,
@@ -114,12 +116,20 @@ const ARGUMENTS: [u32; 13] = [
     GRAVITY_Z.offset,
 ];
 
-const _: () = assert!(GRAVITY_Z.offset as usize / 4 < ARGUMENT_WORDS);
+const _: () = assert!(SPIN_DAMPING.offset as usize / 4 < ARGUMENT_WORDS);
+
+/// The arguments after a reset.
+const ARGUMENTS_AT_RESET: [u32; ARGUMENT_WORDS] = {
+    let mut words = [0; ARGUMENT_WORDS];
+    words[SPIN_DAMPING.offset as usize / 4] = SPIN_DAMPING.reset;
+    words
+};
 
 impl Registers {
     pub(super) fn new(config: &BoardConfig) -> Self {
         Self {
-            arguments: [0; ARGUMENT_WORDS],
+            extensions: config.built_extensions(),
+            arguments: ARGUMENTS_AT_RESET,
             gie: false,
             ier: 0,
             isr: 0,
@@ -134,7 +144,7 @@ impl Registers {
 
     /// Resets all registers but the counters of the last step, which stay readable.
     pub(super) fn reset(&mut self) {
-        self.arguments = [0; ARGUMENT_WORDS];
+        self.arguments = ARGUMENTS_AT_RESET;
         self.gie = false;
         self.ier = 0;
         self.isr = 0;
@@ -143,6 +153,12 @@ impl Registers {
         self.error = 0;
         self.error_detail = 0;
         self.shapes.fill(Shape::default());
+    }
+
+    /// Whether this board has an argument at the offset.
+    fn has_argument(&self, offset: u32) -> bool {
+        ARGUMENTS.contains(&offset)
+            || (offset == SPIN_DAMPING.offset && self.extensions.spin_damping)
     }
 
     fn argument(&self, offset: u32) -> u32 {
@@ -166,6 +182,7 @@ impl Registers {
                 drift: self.number(POSITION_DRIFT.offset),
                 coefficient: self.number(POSITION_COEFFICIENT.offset),
                 friction: self.number(FRICTION.offset),
+                spin_damping: self.number(SPIN_DAMPING.offset),
             },
             integration: Integration {
                 time_step,
@@ -249,7 +266,7 @@ impl Registers {
             _ if offset == GIE.offset => u32::from(self.gie),
             _ if offset == IER.offset => self.ier,
             _ if offset == ISR.offset => self.isr,
-            _ if ARGUMENTS.contains(&offset) => self.argument(offset),
+            _ if self.has_argument(offset) => self.argument(offset),
             _ if offset == IDENTIFICATION.offset => config.quirks.identification,
             _ if offset == VERSION.offset => config.quirks.version,
             _ if offset == PROFILE.offset => profile.id,
@@ -261,6 +278,7 @@ impl Registers {
                     | features::FLUSH_SUBNORMALS
                         .put(0, u32::from(config.subnormals == Subnormals::Flush))
                     | features::WORLD_INERTIA.put(0, u32::from(config.inertia == Inertia::World))
+                    | self.extensions.features()
             }
             _ if offset == CHANNELS.offset => {
                 let mm2s = register(profile.mm2s_widths.len());
@@ -320,7 +338,7 @@ impl Registers {
 
     /// Whether a write to this register is an error while a step runs.
     pub(super) fn is_argument(&self, offset: u32) -> bool {
-        ARGUMENTS.contains(&offset) || self.shape_at(offset).is_some()
+        self.has_argument(offset) || self.shape_at(offset).is_some()
     }
 
     /// Writes a register; `None` if no register has this offset.
@@ -343,8 +361,10 @@ impl Registers {
                 self.ier = value & (irq::DONE.mask() | irq::READY.mask() | irq::ERROR.mask());
             }
             _ if offset == ISR.offset => self.isr ^= value & self.ier,
-            _ if ARGUMENTS.contains(&offset) => self.arguments[offset as usize / 4] = value,
+            _ if self.has_argument(offset) => self.arguments[offset as usize / 4] = value,
             _ if offset == RESET.offset && value & 1 != 0 => return Some(Request::Reset),
+            // An argument that this board lacks.
+            _ if offset == SPIN_DAMPING.offset => return None,
             _ => {
                 // The rest is read-only or does not exist.
                 return pgs_interface::control::REGISTERS

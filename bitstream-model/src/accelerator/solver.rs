@@ -12,7 +12,7 @@ use super::arithmetic::inertia::{Inertia, Stored, Times};
 use super::arithmetic::number::{Format, Number};
 use super::arithmetic::vector::Vec3;
 use super::records::decode::Collision;
-use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
+use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 
 /// Mass properties of a body.
@@ -51,15 +51,21 @@ pub(crate) struct SolverParameters {
     pub(crate) drift: f32,
     pub(crate) coefficient: f32,
     pub(crate) friction: f32,
+    /// Share of the spin that a friction pass takes away.
+    pub(crate) spin_damping: f32,
 }
 
 impl SolverParameters {
     /// The parameters in numbers of a format.
     pub(crate) fn rounded<F: Format>(&self) -> Self {
-        let Self { time_step, drift, coefficient, friction } = *self;
-        let [time_step, drift, coefficient, friction] = [time_step, drift, coefficient, friction]
-            .map(|number| Number::<F>::new(number).value());
-        Self { time_step, drift, coefficient, friction }
+        let round = |number| Number::<F>::new(number).value();
+        Self {
+            time_step: round(self.time_step),
+            drift: round(self.drift),
+            coefficient: round(self.coefficient),
+            friction: round(self.friction),
+            spin_damping: round(self.spin_damping),
+        }
     }
 }
 
@@ -264,7 +270,7 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     let cosine = || (position_b - position_a).unit().dot(arm_a.unit());
     let one_static = a.inverse.m.is_zero() || b.inverse.m.is_zero();
     if one_static || cosine().above(Number::new(SPIN_COSINE)) {
-        let share = Number::new(SPIN_DAMPING);
+        let share = Number::new(parameters.spin_damping);
         let q = q.widened::<U>();
         let spin_a = q.dot(a.w);
         let spin_b = q.dot(b.w);
@@ -283,8 +289,13 @@ mod tests {
 
     const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6] };
     const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: [0.0; 6] };
-    const PARAMETERS: SolverParameters =
-        SolverParameters { time_step: 0.5, drift: 0.0, coefficient: 0.0, friction: 0.5 };
+    const PARAMETERS: SolverParameters = SolverParameters {
+        time_step: 0.5,
+        drift: 0.0,
+        coefficient: 0.0,
+        friction: 0.5,
+        spin_damping: 0.1,
+    };
 
     /// A point mass above the ground, normal from B (the mass) down to A (the ground).
     fn on_the_ground() -> Collision {

@@ -29,6 +29,7 @@ use std::time::{Duration, Instant};
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use pgs_interface::control::{FEATURES, IDENTIFICATION, IDENTIFICATION_VALUE, features};
+use pgs_interface::extension::Extensions;
 use pgs_interface::profile::FLOAT;
 use pgs_interface::record::Beat;
 
@@ -72,7 +73,7 @@ impl SimulatorProcess {
     }
 
     /// Starts a simulator as the accelerator of a board that is built as `config` says. The board
-    /// treats subnormal numbers as the simulator does.
+    /// treats subnormal numbers as the simulator does, and has no extension that the simulator lacks.
     ///
     /// # Errors
     /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] for
@@ -94,6 +95,7 @@ impl SimulatorProcess {
             true => Subnormals::Flush,
             false => Subnormals::Keep,
         };
+        config.extensions = config.extensions.and(Extensions::reported(features));
         Ok(simulator)
     }
 

@@ -403,7 +403,7 @@ fn time_can_run_to_its_end_without_harm() {
 fn misread_identity_is_impossible_on_a_live_board() {
     let host = Host::new(BoardConfig::default());
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
-    assert_eq!(host.control(control::VERSION), 0x0001_0001);
+    assert_eq!(host.control(control::VERSION), 0x0001_0002);
     assert_eq!(host.control(control::PROFILE), 1);
     // Checksums, interlocked, impulse sum.
     assert_eq!(host.control(control::FEATURES), 0b1011);

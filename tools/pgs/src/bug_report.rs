@@ -86,6 +86,7 @@ fn parameters_json(parameters: &StepParameters) -> Value {
         "position_coefficient": parameters.position_coefficient,
         "friction": parameters.friction,
         "angular_damping": parameters.angular_damping,
+        "spin_damping": parameters.spin_damping,
         "gravity_m_s2": parameters.gravity,
         "contact_iterations": parameters.contact_iterations,
         "friction_iterations": parameters.friction_iterations,

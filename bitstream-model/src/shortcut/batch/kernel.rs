@@ -9,7 +9,7 @@
 use super::Stage;
 use super::block::{Block, Words, kind};
 use super::numbers::{Arithmetic, Numbers};
-use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
+use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
 
@@ -372,7 +372,7 @@ fn friction<A: Arithmetic>(
         tested(block, kind::SPINS)
     };
     if spins.any() {
-        let share = arithmetic.splat(SPIN_DAMPING);
+        let share = arithmetic.splat(pass.parameters.spin_damping);
         let spin_a = dot(q, a.w);
         let spin_b = dot(q, b.w);
         a.w = either(spins, sub(a.w, times(q, spin_a * share)), a.w);

@@ -28,8 +28,13 @@ fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
     numbers.map(|number| Number::<F>::new(number).value())
 }
 
-const PARAMETERS: SolverParameters =
-    SolverParameters { time_step: 1.0 / 60.0, drift: 0.005, coefficient: 0.2, friction: 0.7 };
+const PARAMETERS: SolverParameters = SolverParameters {
+    time_step: 1.0 / 60.0,
+    drift: 0.005,
+    coefficient: 0.2,
+    friction: 0.7,
+    spin_damping: 0.1,
+};
 
 const fn mass(inverse_mass: f32, inverse_inertia: f32) -> Mass {
     Mass { inverse_mass, inverse_inertia: [inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0] }
