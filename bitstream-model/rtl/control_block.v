@@ -44,6 +44,7 @@ module control_block (
   output reg  [31:0] gravity_x,
   output reg  [31:0] gravity_y,
   output reg  [31:0] gravity_z,
+  output reg  [31:0] spin_damping,
   output reg  [1:0]  shape_write,
   output reg  [5:0]  shape_address,
   output reg  [31:0] shape_in,
@@ -200,6 +201,7 @@ module control_block (
           OFFSET_GRAVITY_X:            gravity_x           <= write_data;
           OFFSET_GRAVITY_Y:            gravity_y           <= write_data;
           OFFSET_GRAVITY_Z:            gravity_z           <= write_data;
+          OFFSET_SPIN_DAMPING:         spin_damping        <= write_data;
           default: ;
         endcase
         if (shape_space_w & ~write_address[3]) begin
@@ -230,6 +232,7 @@ module control_block (
       {contact_iterations, friction_iterations}   <= 64'd0;
       {time_step, drift, coefficient, friction}   <= 128'd0;
       {damping, gravity_x, gravity_y, gravity_z}  <= 128'd0;
+      spin_damping                                <= RESET_SPIN_DAMPING;
     end
     if (~resetn) begin
       {bvalid, writing, done_late} <= 3'b000;
@@ -266,6 +269,7 @@ module control_block (
       OFFSET_GRAVITY_X:            argument_read <= gravity_x;
       OFFSET_GRAVITY_Y:            argument_read <= gravity_y;
       OFFSET_GRAVITY_Z:            argument_read <= gravity_z;
+      OFFSET_SPIN_DAMPING:         argument_read <= spin_damping;
       default:                     argument_read <= 32'd0;
     endcase
     case (read_address)

@@ -25,6 +25,7 @@ module core (
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
   input  wire [31:0]  friction_coefficient,
+  input  wire [31:0]  spin_damping,
   input  wire [31:0]  damping,
   input  wire [31:0]  gravity_x,
   input  wire [31:0]  gravity_y,
@@ -86,7 +87,7 @@ module core (
   wire [3:0] sender_finished;
 
   step_sequence #(
-    .CONTACT_FILL(CONTACT_FILL), .FRICTION_FILL(FRICTION_FILL), .FINISH(READ_LATENCY + INTEGRATION_DEPTH + 4)
+    .CONTACT_FILL(CONTACT_FILL), .FRICTION_FILL(FRICTION_FILL), .FINISH(READ_LATENCY + INTEGRATION_DEPTH + 5)
   ) steps (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
@@ -367,7 +368,8 @@ module core (
     .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
     .point0(rows[479:384]), .point1(rows[607:512]), .point2(rows[735:640]), .point3(rows[863:768]),
     .used1(used[1]), .used2(used[2]), .used3(used[3]),
-    .total(impulse0), .friction(friction_coefficient), .impulse0(impulse1), .impulse1(impulse2),
+    .total(impulse0), .friction(friction_coefficient), .spin_damping(spin_damping),
+    .impulse0(impulse1), .impulse1(impulse2),
     .out_impulse0(friction_impulses[31:0]), .out_impulse1(friction_impulses[63:32]),
     .out_linear_a(friction_velocity_a[95:0]), .out_angular_a(friction_velocity_a[191:96]),
     .out_linear_b(friction_velocity_b[95:0]), .out_angular_b(friction_velocity_b[191:96])

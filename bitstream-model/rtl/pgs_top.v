@@ -48,6 +48,7 @@ module pgs_top (
   wire        starting /* verilator public_flat_rd */;
   wire [31:0] bodies, collisions, contact_iterations, friction_iterations, flags;
   wire [31:0] time_step, drift, coefficient, friction, damping, gravity_x, gravity_y, gravity_z;
+  wire [31:0] spin_damping;
   wire [1:0]  shape_write;
   wire [5:0]  shape_address;
   wire [31:0] shape_in;
@@ -76,6 +77,7 @@ module pgs_top (
     .contact_iterations(contact_iterations), .friction_iterations(friction_iterations), .flags(flags),
     .time_step(time_step), .drift(drift), .coefficient(coefficient), .friction(friction),
     .damping(damping), .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
+    .spin_damping(spin_damping),
     .shape_write(shape_write), .shape_address(shape_address), .shape_in(shape_in),
     .busy(busy), .done(done), .error(error), .error_code(error_code), .error_channel(error_channel),
     .error_detail(error_detail), .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles),
@@ -87,7 +89,7 @@ module pgs_top (
     .bodies(bodies[19:0]), .collisions(collisions[19:0]),
     .contact_iterations(contact_iterations[7:0]), .friction_iterations(friction_iterations[7:0]),
     .integrate(flags[0]), .time_step(time_step), .drift(drift), .coefficient(coefficient),
-    .friction_coefficient(friction), .damping(damping),
+    .friction_coefficient(friction), .spin_damping(spin_damping), .damping(damping),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
     .shape_write(shape_write), .shape_address(shape_address), .shape_in(shape_in),
     .s_tdata({s3_axis_tdata, s2_axis_tdata, s1_axis_tdata, s0_axis_tdata}),

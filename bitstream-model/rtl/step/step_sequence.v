@@ -57,7 +57,7 @@ module step_sequence #(
   localparam [3:0] SETUP = 4'd10;
   localparam [3:0] FIND  = 4'd4;        // cycle of the setup from which on the finder runs
 
-  localparam [2:0] SETTLE = 3'd4;
+  localparam [2:0] SETTLE = 3'd3;
 
   localparam IDLE    = 3'd0;
   localparam LOAD    = 3'd1;

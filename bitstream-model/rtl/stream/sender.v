@@ -23,15 +23,15 @@ module sender #(
   output wire         tvalid,
   input  wire         tready,
 
-  output reg          finished, // all rows of the step have left
+  output reg          finished, // all rows of the step have left, the last one two cycles ago
   output wire [31:0]  sum
 );
   localparam [ADDRESS:0] CREDITS = (1 << ADDRESS) - 4;
 
   reg [ADDRESS:0]  credits;
-  reg [19:0]       rows_left;
-  reg              row_is_last, one_row;
-  reg              taken, given;     // a credit, in the cycle before
+  reg [19:0]       rows_left, beats_left;
+  reg              row_is_last, beat_is_last, one_row;
+  reg              taken, given;     // a credit, in the cycle before; a beat gives one as it leaves
   wire             leaves = tvalid & tready;
 
   always @(posedge clk) begin
@@ -39,11 +39,13 @@ module sender #(
     taken   <= enters & ~clear;
     given   <= leaves & ~clear;
     if (clear) begin
-      credits     <= CREDITS;
-      has_room    <= 1'b1;
-      rows_left   <= bodies;
-      row_is_last <= one_row;
-      finished    <= 1'b0;
+      credits      <= CREDITS;
+      has_room     <= 1'b1;
+      rows_left    <= bodies;
+      row_is_last  <= one_row;
+      beats_left   <= bodies;
+      beat_is_last <= one_row;
+      finished     <= 1'b0;
     end else begin
       if (taken & ~given) credits <= credits - 1'b1;
       if (given & ~taken) credits <= credits + 1'b1;
@@ -53,7 +55,11 @@ module sender #(
         rows_left   <= rows_left - 20'd1;
         row_is_last <= rows_left == 20'd2;
       end
-      finished <= finished | (leaves & tlast);
+      if (given) begin
+        beats_left   <= beats_left - 20'd1;
+        beat_is_last <= beats_left == 20'd2;
+        finished     <= beat_is_last;
+      end
     end
   end
 

@@ -7,9 +7,9 @@ use pgs_interface::control::{
     self, ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, CYCLES_LO, ERROR,
     ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, RESET, SHAPE_STRIDE,
-    SHAPE_TABLE, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
+    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES,
+    ap_ctrl,
 };
-
 use pgs_interface::register::Register;
 
 use crate::packets::{Beats, STREAMS};
@@ -163,7 +163,7 @@ pub(crate) fn set_up(
 ) -> Result<(), ExternalError> {
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let arguments = &scene.arguments;
-    let [time_step, drift, coefficient, friction, damping] = arguments.numbers;
+    let [time_step, drift, coefficient, friction, damping, spin_damping] = arguments.numbers;
     let [x, y, z] = arguments.gravity;
     let words = [
         (BODIES, count(scene.bodies.len())),
@@ -179,6 +179,7 @@ pub(crate) fn set_up(
         (GRAVITY_X, x),
         (GRAVITY_Y, y),
         (GRAVITY_Z, z),
+        (SPIN_DAMPING, spin_damping),
     ];
     for (register, value) in words {
         accelerator.write(register.offset, value)?;

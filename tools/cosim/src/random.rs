@@ -1,5 +1,6 @@
 //! Random scenes of every kind that the interface permits, and of kinds that it refuses.
 
+use pgs_interface::profile::solver::SPIN_DAMPING;
 use pgs_interface::record::CONTACT_POINTS;
 use rtlgen::verify::random::SplitMix64;
 
@@ -173,6 +174,7 @@ pub fn case(seed: u64) -> Case {
             draw.number(1.0).abs().to_bits(),
             draw.number(1.0).abs().to_bits(),
             (1.0 - draw.number(0.1).abs()).to_bits(),
+            SPIN_DAMPING.to_bits(),
         ],
         gravity: [draw.number(1.0).to_bits(), (-9.8_f32).to_bits(), draw.component(1.0)],
     };
@@ -194,6 +196,12 @@ pub fn case(seed: u64) -> Case {
     let mut case = Case { scene, fault: None };
     if draw.one_in(6) {
         draw.spoil(&mut case);
+    }
+    // The draws above stay as they are.
+    if draw.one_in(2) {
+        let share = if draw.one_in(3) { 0.0 } else { draw.number(1.0).abs() };
+        let [.., spin_damping] = &mut case.scene.arguments.numbers;
+        *spin_damping = share.to_bits();
     }
     case
 }

@@ -54,6 +54,7 @@ pub fn scene(folder: &Folder) -> Scene {
                 parameters.position_coefficient,
                 parameters.friction,
                 parameters.angular_damping,
+                parameters.spin_damping,
             ]
             .map(f32::to_bits),
             gravity: bits(parameters.gravity),

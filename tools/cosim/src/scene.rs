@@ -50,8 +50,8 @@ pub struct Arguments {
     pub friction_iterations: u32,
     /// Whether the bodies are integrated.
     pub integrate: bool,
-    /// Time step, drift, position coefficient, friction, angular damping, as bits of f32.
-    pub numbers: [u32; 5],
+    /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
+    pub numbers: [u32; 6],
     /// Gravity.
     pub gravity: [u32; 3],
 }

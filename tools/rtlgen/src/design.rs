@@ -1,5 +1,6 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
+use pgs_interface::extension::Extensions;
 use pgs_interface::profile::{Depth, FLOAT};
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -37,6 +38,9 @@ impl Default for Parameters {
         }
     }
 }
+
+/// The extensions of the interface that the Verilog has.
+pub const EXTENSIONS: Extensions = Extensions { spin_damping: true };
 
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -110,7 +114,7 @@ const AROUND_A_PASS: u32 = 8;
 
 /// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last body
 /// through the integration: set-up in front of the first pass (10), the end of the load (2), the entry
-/// into the integration (1), the result FIFOs and their end (4), the sums and the end (4).
+/// into the integration (1), the result FIFOs and their end (5), the sums and the end (3).
 const AROUND_A_STEP: u32 = 21;
 
 impl Design {

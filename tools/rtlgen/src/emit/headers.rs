@@ -7,7 +7,7 @@ use pgs_interface::control::{
 };
 use pgs_interface::profile::{Depth, FLOAT, solver};
 
-use crate::design::Design;
+use crate::design::{Design, EXTENSIONS};
 use crate::operators;
 
 use super::text::{Text, line};
@@ -32,6 +32,7 @@ pub(super) fn interface() -> String {
         for register in REGISTERS {
             constant(text, 12, &format!("OFFSET_{}", register.name), register.offset);
         }
+        constant(text, 32, "RESET_SPIN_DAMPING", control::SPIN_DAMPING.reset);
         constant(text, 12, "SHAPE_TABLE", control::SHAPE_TABLE);
         for code in ErrorCode::ALL {
             constant(text, 8, &format!("ERROR_{}", screaming(&format!("{code:?}"))), code as u32);
@@ -91,7 +92,8 @@ fn capabilities(text: &mut Text, design: &Design) {
     let features = features::CHECKSUMS.mask()
         | features::IMPULSE_SUM.mask()
         | features::FLUSH_SUBNORMALS.mask()
-        | features::INTERLOCKED.put(0, parameters.interlocked.into());
+        | features::INTERLOCKED.put(0, parameters.interlocked.into())
+        | EXTENSIONS.features();
     let words = [
         ("IDENTIFICATION", control::IDENTIFICATION.reset),
         ("VERSION", control::VERSION.reset),

@@ -6,7 +6,7 @@
 //!   for k = 0, 1:  row(t_k, c - pA, c - pB)
 //!     l = e * J;  u = min(max(G_k + l, -limit), limit);  l = u - G_k;  G_k = u;  apply
 //!   if mA == 0 or mB == 0 or dot(unit(pB - pA), unit(c - pA)) > 0.95:
-//!     wA -= q * (dot(q,wA) * 0.1);  wB -= q * (dot(q,wB) * 0.1)      both dots before both updates
+//!     wA -= q * (dot(q,wA) * damping);  wB -= q * (dot(q,wB) * damping)      both dots before both updates
 //!
 //! tangents(n), |n.z| > sqrt(1/2):  s = n.y*n.y + n.z*n.z   k = 1/sqrt(s)
 //!                                  t_0 = (0, -n.z*k, n.y*k)   t_1 = (s*k, -n.x*t_0.z, n.x*t_0.y)
@@ -14,7 +14,7 @@
 //!                                  t_0 = (-n.y*k, n.x*k, 0)   t_1 = (-n.z*t_0.y, n.z*t_0.x, s*k)
 //! ```
 
-use pgs_interface::profile::solver::{SPIN_COSINE, SPIN_DAMPING, TANGENT_Z};
+use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 
 use super::row::{self, Row, Velocity};
@@ -70,7 +70,8 @@ pub fn friction() -> Graph {
     }
     let velocities = g.within("spin", |g| {
         let damped = spin_is_damped(g, one_static, positions, arms[0]);
-        velocities.map(|velocity| damp_spin(g, axis, velocity, damped))
+        let share = g.input(Source::Argument, "spin_damping");
+        velocities.map(|velocity| damp_spin(g, axis, velocity, damped, share))
     });
     row::output_velocities(g, velocities);
     graph
@@ -123,10 +124,15 @@ fn spin_is_damped(
     g.either(one_static, far)
 }
 
-/// `w -= q * (dot(q,w) * 0.1)`, where `damped` is 1.
-fn damp_spin(g: &mut Graph, axis: Vec3, velocity: Velocity, damped: Operand) -> Velocity {
+/// `w -= q * (dot(q,w) * share)`, where `damped` is 1.
+fn damp_spin(
+    g: &mut Graph,
+    axis: Vec3,
+    velocity: Velocity,
+    damped: Operand,
+    share: Operand,
+) -> Velocity {
     let spin = g.dot(axis, velocity.angular);
-    let share = g.constant(SPIN_DAMPING);
     let spin = g.multiply(spin, share);
     let taken = g.scale(axis, spin).negated().only_if(damped);
     Velocity { angular: g.add3(velocity.angular, taken), ..velocity }
