@@ -31,7 +31,7 @@ fn arguments(
         (COLLISIONS, collisions),
         (CONTACT_ITERATIONS, parameters.contact_iterations),
         (FRICTION_ITERATIONS, parameters.friction_iterations),
-        (FLAGS, flags::INTEGRATE.put(0, u32::from(parameters.integrate))),
+        (FLAGS, flags_of(parameters)),
         (TIME_STEP, parameters.time_step.to_bits()),
         (POSITION_DRIFT, parameters.position_drift.to_bits()),
         (POSITION_COEFFICIENT, parameters.position_coefficient.to_bits()),
@@ -42,6 +42,12 @@ fn arguments(
         (GRAVITY_Z, parameters.gravity[2].to_bits()),
         (SPIN_DAMPING, parameters.spin_damping.to_bits()),
     ]
+}
+
+/// The switches of a step.
+fn flags_of(parameters: &StepParameters) -> u32 {
+    let word = flags::INTEGRATE.put(0, parameters.integrate.into());
+    flags::KINEMATIC.put(word, parameters.kinematic.into())
 }
 
 /// The accelerator's control block.

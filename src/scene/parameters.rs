@@ -126,6 +126,11 @@ pub struct StepParameters {
     /// forces and gravity (added to the velocities before the step), gyroscopic terms, damping,
     /// continuous collision detection, sleeping.
     pub integrate: bool,
+    /// Whether static bodies may move: bodies of inverse mass 0 then have the velocity that they
+    /// come with. It counts in the contacts, nothing changes it, and a step with integration moves
+    /// the pose by it, without damping and gravity: platforms, doors, conveyors. Collisions of such
+    /// a body are no hazard, whatever their number. Without it a static body must be at rest.
+    pub kinematic: bool,
     /// Order in which the collisions are sent; `None` is the cheapest order on the board at hand:
     ///
     /// | the pipeline | order |
@@ -182,6 +187,7 @@ impl Default for StepParameters {
             contact_iterations: 4,
             friction_iterations: 4,
             integrate: true,
+            kinematic: false,
             order: None,
             verify_order: false,
             deadline: None,

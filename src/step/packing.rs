@@ -13,7 +13,7 @@ use crate::board::plan::Plan;
 use crate::board::port::Port;
 use crate::order::Lives;
 use crate::record::body_table::Survey;
-use crate::scene::{Bodies, Collisions, Shape};
+use crate::scene::{Bodies, Collisions, Shape, Velocity};
 use crate::validate::InputError;
 use crate::validate::Quick;
 
@@ -68,6 +68,7 @@ impl Device {
                 (velocities, poses, passed & first_passed & last_passed)
             }
         };
+        self.statics[bank].retain(|body| rests(bodies, *body));
         let words = lives.map(Lives::words);
         let of_entries = Entries { collisions, count: plan.collisions, added, words };
         let (collisions, passed) =
@@ -94,6 +95,7 @@ impl Device {
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
+        self.statics[bank].retain(|body| rests(bodies, *body));
         if !passed {
             refuse()?;
             return Err(InputError::Unsteady);
@@ -104,6 +106,12 @@ impl Device {
         let (collisions, count) = writer.finish()?;
         Ok((SentSums { velocities, collisions, poses }, count))
     }
+}
+
+/// Whether a body is at rest. A static one then keeps its pose, and its result is not read.
+fn rests<B: Bodies + ?Sized>(bodies: &B, index: u32) -> bool {
+    let Velocity { linear, angular } = bodies.body(index as usize).velocity;
+    linear.into_iter().chain(angular).all(|speed| speed == 0.0)
 }
 
 /// The buffers of the MM2S ports, each split into its three segments.

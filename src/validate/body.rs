@@ -26,7 +26,7 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
         let shapes = scene.shapes.len();
         return Err(InputError::ShapeIndex { body: index, found: body.shape, shapes });
     };
-    if shape.is_static() {
+    if shape.is_static() && !scene.kinematic {
         for (field, values) in [(LINEAR, body.velocity.linear), (ANGULAR, body.velocity.angular)] {
             if values.iter().any(|value| *value != 0.0) {
                 let (component, found) = first(&values, |value| value != 0.0);

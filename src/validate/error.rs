@@ -105,7 +105,8 @@ pub enum InputError {
     /// A static body has a velocity.
     #[error(
         "body {body} is static (its shape has inverse mass 0) but its {field}[{component}] is \
-         {found}: set its velocity to 0, or give it a shape with a mass"
+         {found}: set its velocity to 0, give it a shape with a mass, or let static bodies move \
+         (`StepParameters::kinematic`)"
     )]
     StaticBodyMoves {
         /// The body.

@@ -22,6 +22,16 @@ pub enum Excess {
         known: f32,
     },
 
+    /// The step asks for an extension of the interface.
+    #[error(
+        "the step asks for {extension}, which this bitstream does not have: do without, or load one \
+         of interface version 1.2 with this extension"
+    )]
+    Lacks {
+        /// The extension.
+        extension: &'static str,
+    },
+
     /// More bodies than the bitstream has room for, whatever the memory.
     #[error(
         "found {found} bodies, the bitstream takes at most {limit}: give fewer, or load another"

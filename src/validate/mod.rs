@@ -154,7 +154,8 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     check_shapes(shapes, &needs, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
-    Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals })
+    let kinematic = parameters.kinematic;
+    Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals, kinematic })
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
@@ -196,6 +197,8 @@ pub(crate) struct Scene<'a> {
     variant: &'a Variant,
     held: Held,
     flush_subnormals: bool,
+    /// Whether static bodies may move.
+    kinematic: bool,
 }
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
@@ -277,7 +280,8 @@ pub(crate) mod tests {
     /// The context of checks on a bitstream of `variant`.
     pub(crate) fn scene_on(variant: &Variant, flush_subnormals: bool) -> Scene<'_> {
         let held = Held::by(&variant.numbers);
-        Scene { shapes: &SHAPES, needs: NEEDS, variant, held, flush_subnormals }
+        let kinematic = false;
+        Scene { shapes: &SHAPES, needs: NEEDS, variant, held, flush_subnormals, kinematic }
     }
 
     fn body(shape: u32) -> Body {

@@ -51,6 +51,10 @@ pub(crate) fn check_parameters(
         let excess = Excess::Extension { parameter, found, known: SPIN_DAMPING };
         return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
     }
+    if parameters.kinematic && !limits.extensions.kinematic {
+        let excess = Excess::Lacks { extension: "static bodies that move" };
+        return Err(needs.refuse(excess, |variant| Extensions::possible(variant).kinematic));
+    }
     if computes_short(&limits.variant.numbers) {
         let (format, component) = (StreamFormat::Binary16, 0);
         let largest = format.largest();

@@ -90,7 +90,8 @@ impl<'a> Quick<'a> {
             good &= bodies.iter().zip(ends).all(|(body, end)| {
                 let speeds = [body.velocity.linear, body.velocity.angular];
                 let moves = speeds.as_flattened().iter().fold(0, |bits, v| bits | v.to_bits());
-                !end.is_static() | (end.has_shape() & (moves & MAGNITUDE == 0))
+                let may_move = self.scene.kinematic | (moves & MAGNITUDE == 0);
+                !end.is_static() | (end.has_shape() & may_move)
             });
         }
         good || self.bodies_exactly(first, bodies)

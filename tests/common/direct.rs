@@ -4,7 +4,7 @@
 //! Sources: `bitstream-model/README.md`, arithmetic; Bullet's `b3Matrix3x3::setRotation` for the
 //! rotation matrix.
 
-use zynq_pgs::{Body, Collision, Shape, StepParameters};
+use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
 
 pub(crate) type Vec3 = [f32; 3];
 
@@ -253,11 +253,30 @@ pub(crate) fn direct_step(
                 let [at_a, at_b] = [collision.body_a, collision.body_b].map(|at| at as usize);
                 let (mut a, mut b) = (moving[at_a], moving[at_b]);
                 pass(collision, &mut a, &mut b, impulses, parameters);
-                (moving[at_a], moving[at_b]) = (a, b);
+                for (at, body) in [(at_a, a), (at_b, b)] {
+                    // Nothing changes the velocity of a body without a mass.
+                    if body.m != 0.0 {
+                        moving[at] = body;
+                    }
+                }
             }
         }
     }
-    for (body, moving) in bodies.iter_mut().zip(&moving).filter(|(_, moving)| moving.m != 0.0) {
-        integrate(body, moving, parameters);
+    if !parameters.integrate {
+        for (body, moving) in bodies.iter_mut().zip(&moving) {
+            body.velocity = Velocity { linear: moving.v, angular: moving.w };
+        }
+        return;
+    }
+    let mut undamped = *parameters;
+    undamped.angular_damping = 1.0;
+    for (body, moving) in bodies.iter_mut().zip(&moving) {
+        let given = body.velocity;
+        if moving.m != 0.0 {
+            integrate(body, moving, parameters);
+        } else if moving.v != [0.0; 3] || moving.w != [0.0; 3] {
+            integrate(body, moving, &undamped);
+            body.velocity = given;
+        }
     }
 }

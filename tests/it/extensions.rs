@@ -4,34 +4,36 @@
 
 use crate::common::direct::direct_step;
 use crate::common::random_scene::{scene, shapes};
-use crate::common::{bits, open_with, ordered};
+use crate::common::{bits, open_with, ordered, row};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::control;
 use bitstream_model::interface::extension::Extensions;
-use bitstream_model::interface::profile::{FLOAT, Inertia, NAIVE};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
 use zynq_pgs::order::Order;
-use zynq_pgs::{Body, Collision, Shape, StepParameters};
+use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
 
-/// The boards whose bits are the direct solver's: f32 with absolute records, world inertia; with the
-/// short cuts of the emulation and without.
-fn boards() -> Vec<BoardConfig> {
+/// The boards whose bits are the direct solver's: f32 with absolute records; with the short cuts of
+/// the emulation and without.
+fn boards(shapes: &[Shape]) -> Vec<BoardConfig> {
     let mut boards = Vec::new();
+    let isotropic = shapes.iter().all(Shape::is_isotropic);
+    let inertia = if isotropic { Inertia::Isotropic } else { Inertia::World };
     for profile in [&FLOAT, &NAIVE] {
         for (shortcuts, lanes, threads) in
             [(false, false, 1), (true, false, 1), (true, true, 1), (true, true, 2)]
         {
-            let inertia = Inertia::World;
-            boards.push(BoardConfig {
-                profile,
-                inertia,
-                shortcuts,
-                lanes,
-                threads,
-                ..BoardConfig::default()
-            });
+            let mut config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+            (config.shortcuts, config.lanes, config.threads) = (shortcuts, lanes, threads);
+            boards.push(config);
         }
     }
     boards
+}
+
+/// Shapes of any inertia, and the same with equal components, which take the short cuts.
+fn both_inertias() -> [Vec<Shape>; 2] {
+    let isotropic = |shape: Shape| Shape::isotropic(shape.inverse_mass, shape.inverse_inertia[0]);
+    [shapes().to_vec(), shapes().map(isotropic).to_vec()]
 }
 
 /// Takes two steps on every board and directly; the bits must be the same.
@@ -45,7 +47,7 @@ fn compare(
     for _ in 0..2 {
         direct_step(&mut expected, collisions, shapes, parameters);
     }
-    for config in boards() {
+    for config in boards(shapes) {
         let (board, mut accelerator) = open_with(config, None, shapes);
         let mut found = bodies.clone();
         for _ in 0..2 {
@@ -61,14 +63,91 @@ fn compare(
 
 #[test]
 fn the_spin_damping_is_the_argument() {
-    let (scene, shapes) = (scene(7), shapes());
+    let scene = scene(7);
     let with = |share| {
         let mut parameters = ordered(Order::AsGiven);
         parameters.spin_damping = share;
-        compare(&scene, &shapes, &parameters)
+        both_inertias().map(|shapes| compare(&scene, &shapes, &parameters))
     };
     let [off, bullet, strong] = [0.0, 0.1, 0.75].map(with);
     assert!(off != bullet && bullet != strong);
+}
+
+/// The scene with a fifth of its bodies without a mass, half of them under way.
+fn with_platforms(seed: u64) -> (Vec<Body>, Vec<Collision>) {
+    let (mut bodies, mut collisions) = scene(seed);
+    for (number, body) in bodies.iter_mut().enumerate().skip(1).step_by(5) {
+        body.shape = 0;
+        if number % 2 == 0 {
+            body.velocity = Velocity::default();
+        }
+    }
+    let fixed = |body: u32| bodies[body as usize].shape == 0;
+    collisions.retain(|of| !(fixed(of.body_a) && fixed(of.body_b)));
+    (bodies, collisions)
+}
+
+#[test]
+fn static_bodies_move_as_the_formulae_say() {
+    for integrate in [true, false] {
+        let mut parameters = ordered(Order::AsGiven);
+        (parameters.kinematic, parameters.integrate) = (true, integrate);
+        for shapes in both_inertias() {
+            let scene = with_platforms(11);
+            let under_way = |body: &&Body| body.shape == 0 && body.velocity != Velocity::default();
+            assert_eq!(scene.0.iter().filter(under_way).count(), 6);
+            compare(&scene, &shapes, &parameters);
+        }
+    }
+}
+
+#[test]
+fn a_static_body_that_moves_is_no_hazard() {
+    let (mut parameters, shapes) = (ordered(Order::AsGiven), both_inertias()[1].clone());
+    parameters.kinematic = true;
+    let (mut bodies, collisions) = row(40, 2.2, |_| Velocity::default());
+    bodies[0].velocity.linear = [0.5, 0.0, 0.0];
+    let (_board, mut accelerator) = open_with(BoardConfig::default(), None, &shapes);
+    let report = accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+    assert_eq!(report.hazards, 0);
+    assert!(bodies[0].pose.position[0] > 0.008, "the platform moves");
+    assert!(bodies[1..].iter().all(|body| body.velocity.linear[0] > 0.0), "and takes them along");
+}
+
+#[test]
+fn static_bodies_move_on_every_profile_that_keeps_all_bodies() {
+    for profile in [&HALF, &MIXED] {
+        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let (board, mut accelerator) = open_with(config, None, &both_inertias()[1]);
+        let mut parameters = StepParameters::default();
+        parameters.kinematic = true;
+        let (mut bodies, collisions) = row(12, 2.2, |_| Velocity::default());
+        bodies.push(Body { velocity: Velocity::default(), ..bodies[0] });
+        bodies[0].velocity.linear = [0.0, 0.0, 3.0];
+        let resting = bodies[13];
+        accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+        assert!((0.03..0.07).contains(&bodies[0].pose.position[2]), "{:?}", bodies[0].pose);
+        assert_eq!(bodies[0].velocity.linear, [0.0, 0.0, 3.0]);
+        assert_eq!(bodies[13], resting, "to the bit");
+        assert!(bodies[1..13].iter().all(|body| body.velocity.linear[2] > 0.0), "{bodies:?}");
+        assert_eq!(board.violations(), []);
+    }
+}
+
+#[test]
+fn a_profile_without_an_extension_names_the_ones_that_have_it() {
+    let config = BoardConfig { profile: &WINDOWED, ..BoardConfig::default() };
+    let (_board, mut accelerator) = open_with(config, None, &both_inertias()[1]);
+    let (mut bodies, collisions) = row(3, 2.2, |_| Velocity::default());
+    let mut parameters = StepParameters::default();
+    parameters.kinematic = true;
+    let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("no place");
+    assert_eq!(
+        error.to_string(),
+        "the step asks for static bodies that move, which this bitstream does not have: do without, \
+         or load one of interface version 1.2 with this extension (profiles that could: naive, \
+         float, half, mixed)"
+    );
 }
 
 /// A board of interface version 1.1.
@@ -98,13 +177,20 @@ fn a_board_of_version_1_1_takes_the_steps_that_it_knows() {
 fn a_board_of_version_1_1_refuses_each_extension_by_name() {
     let ((bodies, collisions), shapes) = (scene(3), shapes());
     let (board, mut accelerator) = open_with(old(), None, &shapes);
-    let mut parameters = StepParameters::default();
-    parameters.spin_damping = 0.0;
-    let mut found = bodies.clone();
-    let error = accelerator.step(&mut found, &collisions, &parameters).expect_err("version 1.1");
-    assert!(error.is_input());
-    assert!(error.to_string().starts_with("the spin damping is 0, and this bitstream"), "{error}");
-    assert_eq!(bits(&found), bits(&bodies), "nothing has changed");
+    let [mut no_spin, mut moving] = [StepParameters::default(); 2];
+    no_spin.spin_damping = 0.0;
+    moving.kinematic = true;
+    let asked = [
+        (no_spin, "the spin damping is 0, and this bitstream"),
+        (moving, "the step asks for static bodies that move, which this bitstream"),
+    ];
+    for (parameters, begins) in asked {
+        let mut found = bodies.clone();
+        let error = accelerator.step(&mut found, &collisions, &parameters).expect_err("1.1");
+        assert!(error.is_input());
+        assert!(error.to_string().starts_with(begins), "{error}");
+        assert_eq!(bits(&found), bits(&bodies), "nothing has changed");
+    }
     assert_eq!(board.violations(), []);
 }
 

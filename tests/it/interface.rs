@@ -181,12 +181,16 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
         (1, 2, 4)
     );
     assert_eq!(control::flags::INTEGRATE.mask(), 1);
+    assert_eq!(control::flags::KINEMATIC.mask(), 1 << 1);
+    assert_eq!(control::flags::PAIR_FRICTION.mask(), 1 << 2);
     assert_eq!(control::features::CHECKSUMS.mask(), 1 << 0);
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
     assert_eq!(control::features::IMPULSE_SUM.mask(), 1 << 3);
     assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 4);
     assert_eq!(control::features::SPIN_DAMPING.mask(), 1 << 5);
+    assert_eq!(control::features::KINEMATIC.mask(), 1 << 6);
+    assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,

@@ -48,6 +48,12 @@ pub mod flags {
     /// Integrate after the solver. Without it poses come back unchanged, and velocities undamped
     /// and without gravity.
     pub const INTEGRATE: Field = Field::bit("integrate", 0, Access::ReadWrite);
+    /// Bodies of inverse mass 0 have the velocity of their record. Without it they are at rest,
+    /// whatever the record holds. Only in a bitstream with [`features::KINEMATIC`](super::features::KINEMATIC).
+    pub const KINEMATIC: Field = Field::bit("kinematic", 1, Access::ReadWrite);
+    /// The friction of a collision is beside its contact count, and FRICTION counts for none. Only in
+    /// a bitstream with [`features::PAIR_FRICTION`](super::features::PAIR_FRICTION).
+    pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 2, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -76,6 +82,11 @@ pub mod features {
     pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
     /// [`SPIN_DAMPING`](super::SPIN_DAMPING) exists; without it the share is its reset value.
     pub const SPIN_DAMPING: Field = Field::bit("spin_damping", 5, Access::ReadOnly);
+    /// Bodies of inverse mass 0 can move ([`flags::KINEMATIC`](super::flags::KINEMATIC)).
+    pub const KINEMATIC: Field = Field::bit("kinematic", 6, Access::ReadOnly);
+    /// Each collision can have a friction of its own
+    /// ([`flags::PAIR_FRICTION`](super::flags::PAIR_FRICTION)).
+    pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 7, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -238,7 +249,14 @@ pub const CONTACT_ITERATIONS: Register = argument("CONTACT_ITERATIONS", 0x20);
 /// Number of friction passes.
 pub const FRICTION_ITERATIONS: Register = argument("FRICTION_ITERATIONS", 0x28);
 /// Switches.
-pub const FLAGS: Register = row("FLAGS", 0x30, Access::ReadWrite, 0, &[flags::INTEGRATE], OURS);
+pub const FLAGS: Register = row(
+    "FLAGS",
+    0x30,
+    Access::ReadWrite,
+    0,
+    &[flags::INTEGRATE, flags::KINEMATIC, flags::PAIR_FRICTION],
+    OURS,
+);
 /// Time step, s, f32.
 pub const TIME_STEP: Register = argument("TIME_STEP", 0x38);
 /// Position drift, m, f32.
@@ -298,6 +316,8 @@ pub const FEATURES: Register = read_only(
         features::IMPULSE_SUM,
         features::WORLD_INERTIA,
         features::SPIN_DAMPING,
+        features::KINEMATIC,
+        features::PAIR_FRICTION,
     ],
 );
 /// Numbers of streams.

@@ -3,7 +3,8 @@
 //! A bitstream of version 1.1 has none of them, and reads 0 in all of their bits.
 
 use super::control::features;
-use super::profile::Variant;
+use super::number::StreamFormat;
+use super::profile::{Flow, Geometry, Variant};
 use super::register::Field;
 
 /// The abilities of a bitstream beyond version 1.1.
@@ -11,18 +12,26 @@ use super::register::Field;
 pub struct Extensions {
     /// The share of the spin that a friction pass takes away is an argument.
     pub spin_damping: bool,
+    /// Bodies of inverse mass 0 can move.
+    pub kinematic: bool,
+    /// Each collision can have a friction of its own.
+    pub pair_friction: bool,
 }
 
 impl Extensions {
     /// None: a bitstream of version 1.1.
-    pub const NONE: Self = Self { spin_damping: false };
+    pub const NONE: Self = Self { spin_damping: false, kinematic: false, pair_friction: false };
     /// All of this version.
-    pub const ALL: Self = Self { spin_damping: true };
+    pub const ALL: Self = Self { spin_damping: true, kinematic: true, pair_friction: true };
 
     /// The extensions that the FEATURES register reports.
     #[must_use]
     pub fn reported(features: u32) -> Self {
-        Self { spin_damping: features::SPIN_DAMPING.is_set(features) }
+        Self {
+            spin_damping: features::SPIN_DAMPING.is_set(features),
+            kinematic: features::KINEMATIC.is_set(features),
+            pair_friction: features::PAIR_FRICTION.is_set(features),
+        }
     }
 
     /// Their bits of the FEATURES register.
@@ -30,17 +39,30 @@ impl Extensions {
     pub fn features(self) -> u32 {
         let bit = |field: Field, on: bool| field.put(0, on.into());
         bit(features::SPIN_DAMPING, self.spin_damping)
+            | bit(features::KINEMATIC, self.kinematic)
+            | bit(features::PAIR_FRICTION, self.pair_friction)
     }
 
-    /// The extensions that a bitstream of a variant can have.
+    /// The extensions that a bitstream of a variant can have: static bodies have a velocity where all
+    /// bodies are on chip, and a friction fits beside the contact count in a word of 32 bits.
     #[must_use]
-    pub const fn possible(_variant: &Variant) -> Self {
-        Self { spin_damping: true }
+    pub const fn possible(variant: &Variant) -> Self {
+        let Variant { profile, numbers, .. } = variant;
+        Self {
+            spin_damping: true,
+            kinematic: matches!(profile.flow, Flow::Passes),
+            pair_friction: matches!(profile.geometry, Geometry::Absolute)
+                && matches!(numbers.collisions, StreamFormat::F32),
+        }
     }
 
     /// The extensions that are in both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
-        Self { spin_damping: self.spin_damping && other.spin_damping }
+        Self {
+            spin_damping: self.spin_damping && other.spin_damping,
+            kinematic: self.kinematic && other.kinematic,
+            pair_friction: self.pair_friction && other.pair_friction,
+        }
     }
 }

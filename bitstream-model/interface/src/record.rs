@@ -73,7 +73,8 @@ pub mod velocity {
 pub mod collision {
     /// Rows of a record.
     pub const ROWS: usize = 7;
-    /// Normal from B to A; the word beside it is the number of contact points.
+    /// Normal from B to A; the word beside it is the number of contact points, in steps with a
+    /// friction for each pair with the friction above it.
     pub const NORMAL: usize = 0;
     /// Position of body A; the word beside it is its index.
     pub const BODY_A: usize = 1;
@@ -81,6 +82,11 @@ pub mod collision {
     pub const BODY_B: usize = 2;
     /// The first contact point; the word beside each is its distance.
     pub const CONTACTS: usize = 3;
+    /// Bits of the count's word that hold the friction of the pair, a binary16 number that is not
+    /// negative: its sign bit counts as a part of the count.
+    pub const FRICTION_BITS: u32 = 0x7FFF_0000;
+    /// The lowest of these bits.
+    pub const FRICTION_SHIFT: u32 = 16;
 }
 
 /// The collision record relative to body A: rows.

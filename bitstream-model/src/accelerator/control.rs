@@ -68,6 +68,8 @@ pub(crate) struct Arguments {
     pub(crate) contact_iterations: u32,
     pub(super) friction_iterations: u32,
     pub(crate) integrate: bool,
+    /// Whether bodies of inverse mass 0 have the velocity of their record.
+    pub(crate) kinematic: bool,
     pub(crate) solver: SolverParameters,
     pub(crate) integration: Integration,
 }
@@ -171,18 +173,22 @@ impl Registers {
 
     pub(super) fn arguments(&self) -> Arguments {
         let time_step = self.number(TIME_STEP.offset);
+        let set = self.argument(FLAGS.offset);
+        let Extensions { kinematic, pair_friction, .. } = self.extensions;
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
             contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
-            integrate: flags::INTEGRATE.is_set(self.argument(FLAGS.offset)),
+            integrate: flags::INTEGRATE.is_set(set),
+            kinematic: kinematic && flags::KINEMATIC.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),
                 coefficient: self.number(POSITION_COEFFICIENT.offset),
                 friction: self.number(FRICTION.offset),
                 spin_damping: self.number(SPIN_DAMPING.offset),
+                pair_friction: pair_friction && flags::PAIR_FRICTION.is_set(set),
             },
             integration: Integration {
                 time_step,

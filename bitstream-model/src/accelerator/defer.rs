@@ -7,7 +7,7 @@
 use std::fmt;
 
 use super::Accelerator;
-use super::control::Shape;
+use super::control::{Arguments, Shape};
 use super::records::results::Results;
 use super::records::segment::{PacketError, Segment};
 use crate::memory::Memory;
@@ -25,7 +25,7 @@ pub(crate) struct ArrivedRecords<'a> {
 /// Takes records from their buffers, and computes passes later and many at once.
 pub(crate) trait Defer: fmt::Debug + Send {
     /// A step begins. Returns whether its collisions are taken, at first.
-    fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) -> bool;
+    fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) -> bool;
 
     /// Whether the collisions of the step under way are still taken.
     fn takes_collisions(&self) -> bool;

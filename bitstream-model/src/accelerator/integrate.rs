@@ -22,6 +22,13 @@ pub(crate) struct Integration {
     pub(crate) gravity: [f32; 3],
 }
 
+impl Integration {
+    /// The integration of a body of inverse mass 0, whose velocity nothing changes.
+    pub(crate) fn undamped(&self) -> Self {
+        Self { angular_damping: 1.0, gravity: [0.0; 3], ..*self }
+    }
+}
+
 /// The state of a moving body one time step later.
 pub(crate) fn integrate<U: Format>(
     parameters: &Integration,

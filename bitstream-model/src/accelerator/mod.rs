@@ -426,7 +426,7 @@ impl Accelerator {
         let collisions = arguments.collisions as usize;
         let shapes = self.registers.shapes();
         self.impulses.clear();
-        if !deferral.is_some_and(|defer| defer.begin_step(collisions, shapes)) {
+        if !deferral.is_some_and(|defer| defer.begin_step(&arguments, shapes)) {
             self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
         }
         self.pipeline.start_step(bodies);

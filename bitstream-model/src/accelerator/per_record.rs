@@ -91,7 +91,8 @@ impl Accelerator {
         };
         // The words of a static body are ignored: thesis16 has none for 0.
         let moves = self.registers.shapes()[usize::from(shape)].inverse_mass != 0.0;
-        let velocity = if moves { velocity } else { Velocity::default() };
+        let velocity =
+            if moves || self.arguments.kinematic { velocity } else { Velocity::default() };
         Ok(Arrival { velocity: self.stored_velocity(velocity), shape, inertia })
     }
 
@@ -137,14 +138,14 @@ impl Accelerator {
         *velocities = velocities.map(|velocity| self.stored_velocity(velocity));
     }
 
-    /// The pose and velocity that a body leaves with.
+    /// The pose and velocity that a body leaves with. `free` tells whether its inverse mass is not 0.
     pub(super) fn integrated(
         &self,
-        moves: bool,
+        free: bool,
         pose: Pose,
         velocity: Velocity,
     ) -> (Pose, Velocity) {
-        if !moves || !self.arguments.integrate {
+        if !self.arguments.integrate || !(free || self.is_under_way(&velocity)) {
             return (pose, velocity);
         }
         let numbers = self.variant.numbers;
@@ -159,6 +160,21 @@ impl Accelerator {
             (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
             (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
         };
-        step(&self.arguments.integration, &pose, &velocity)
+        if free {
+            step(&self.arguments.integration, &pose, &velocity)
+        } else {
+            let (pose, _) = step(&self.arguments.integration.undamped(), &pose, &velocity);
+            (pose, velocity)
+        }
+    }
+
+    /// Whether a velocity is not 0.
+    fn is_under_way(&self, velocity: &Velocity) -> bool {
+        let numbers = [velocity.linear, velocity.angular];
+        let zero = match self.config.subnormals {
+            Subnormals::Keep => |number: f32| number == 0.0,
+            Subnormals::Flush => |number: f32| number.abs() < f32::MIN_POSITIVE,
+        };
+        !numbers.as_flattened().iter().all(|number| zero(*number))
     }
 }

@@ -269,6 +269,9 @@ impl Accelerator {
     pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
         use StreamFormat::{Binary16, F32, Thesis16};
         match (self.variant.profile.geometry, self.variant.numbers.collisions) {
+            (Geometry::Absolute, F32) if self.arguments.solver.pair_friction => {
+                Collision::with_friction(&reader.record())
+            }
             (Geometry::Absolute, F32) => Collision::absolute(F32, &reader.record()),
             (Geometry::Absolute, Binary16) => Collision::absolute(Binary16, &reader.record()),
             (Geometry::Absolute, Thesis16) => Collision::absolute(Thesis16, &reader.record()),

@@ -53,6 +53,8 @@ pub(crate) struct SolverParameters {
     pub(crate) friction: f32,
     /// Share of the spin that a friction pass takes away.
     pub(crate) spin_damping: f32,
+    /// Whether each collision has a friction of its own, in place of `friction`.
+    pub(crate) pair_friction: bool,
 }
 
 impl SolverParameters {
@@ -65,6 +67,7 @@ impl SolverParameters {
             coefficient: round(self.coefficient),
             friction: round(self.friction),
             spin_damping: round(self.spin_damping),
+            pair_friction: self.pair_friction,
         }
     }
 }
@@ -254,7 +257,8 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     let centre = sum * (Number::new(1.0) / Number::new(collision.count as f32));
     let arm_a = centre - position_a;
     let arm_b = centre - position_b;
-    let limit = Number::<U>::new(parameters.friction) * Number::new(impulses[0]);
+    let mu = if parameters.pair_friction { collision.friction } else { parameters.friction };
+    let limit = Number::<U>::new(mu) * Number::new(impulses[0]);
     for (t, accumulated) in tangents(q).into_iter().zip(&mut impulses[1..3]) {
         let row = Row::new(t, arm_a, arm_b, &inverses);
         if row.jacobian.is_zero() {
@@ -295,6 +299,7 @@ mod tests {
         coefficient: 0.0,
         friction: 0.5,
         spin_damping: 0.1,
+        pair_friction: false,
     };
 
     /// A point mass above the ground, normal from B (the mass) down to A (the ground).
@@ -303,6 +308,7 @@ mod tests {
             body_a: 0,
             body_b: 1,
             count: 1,
+            friction: 0.0,
             normal: [0.0, -1.0, 0.0],
             position_a: [0.0, -1.0, 0.0],
             position_b: [0.0, 1.0, 0.0],

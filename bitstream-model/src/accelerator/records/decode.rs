@@ -48,6 +48,8 @@ pub(crate) struct Collision {
     pub(crate) body_a: u32,
     pub(crate) body_b: u32,
     pub(crate) count: usize,
+    /// The friction of the pair; only in a step in which each pair has one.
+    pub(crate) friction: f32,
     pub(crate) normal: [f32; 3],
     pub(crate) position_a: [f32; 3],
     pub(crate) position_b: [f32; 3],
@@ -64,10 +66,22 @@ impl Collision {
             body_a: rows[collision::BODY_A][WORD_LANE],
             body_b: rows[collision::BODY_B][WORD_LANE],
             count: rows[collision::NORMAL][WORD_LANE] as usize,
+            friction: 0.0,
             normal: vec3(format, rows[collision::NORMAL]),
             position_a: vec3(format, rows[collision::BODY_A]),
             position_b: vec3(format, rows[collision::BODY_B]),
             contacts: [contact(0), contact(1), contact(2), contact(3)],
+        }
+    }
+
+    /// A record in world coordinates and f32, with the friction of the pair above its count.
+    #[inline(always)]
+    pub(crate) fn with_friction(rows: &[Row; collision::ROWS]) -> Self {
+        let word = rows[collision::NORMAL][WORD_LANE];
+        Self {
+            count: (word & !collision::FRICTION_BITS) as usize,
+            friction: pair_friction(word),
+            ..Self::absolute(StreamFormat::F32, rows)
         }
     }
 
@@ -94,12 +108,19 @@ impl Collision {
             body_a: rows[relative::NORMAL][WORD_LANE],
             body_b: rows[relative::OFFSET][WORD_LANE],
             count,
+            friction: 0.0,
             normal: vec3(numbers[relative::NORMAL]),
             position_a: [0.0; 3],
             position_b: vec3(numbers[relative::OFFSET]),
             contacts,
         }
     }
+}
+
+/// The friction above a contact count.
+#[inline(always)]
+pub(crate) fn pair_friction(word: u32) -> f32 {
+    sixteen::from_binary16((word & collision::FRICTION_BITS) >> collision::FRICTION_SHIFT)
 }
 
 /// A velocity record: the velocity and the shape index.

@@ -97,6 +97,7 @@ mod tests {
             body_a,
             body_b,
             count,
+            friction: 0.0,
             normal: [0.0; 3],
             position_a: [0.0; 3],
             position_b: [0.0; 3],

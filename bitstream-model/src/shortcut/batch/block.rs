@@ -6,7 +6,7 @@
 
 use crate::accelerator::hazards::Entry;
 use crate::accelerator::records::array::Row;
-use crate::accelerator::records::decode::Collision;
+use crate::accelerator::records::decode::{Collision, pair_friction};
 use crate::accelerator::solver::Impulses;
 use crate::config::THREADS_MAX;
 use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
@@ -27,6 +27,8 @@ const _: () = assert!(ROWS_APART as usize / 2 > THREADS_MAX);
 
 /// The bits that describe a lane.
 pub(crate) mod kind {
+    use pgs_interface::record::collision;
+
     /// The number of contact points; 0 in an empty lane.
     pub(crate) const COUNT: u32 = 7;
     /// Body A moves, body B moves.
@@ -36,11 +38,14 @@ pub(crate) mod kind {
     /// In the first lane: the collisions are taken one after the other.
     pub(crate) const SERIAL: u32 = 1 << 11;
 
-    /// The kind of a collision.
+    /// The friction of the pair, as it lies above the contact count; 0 in steps without.
+    pub(crate) const FRICTION: u32 = collision::FRICTION_BITS;
+
+    /// The kind of a collision; `head` is its contact count, which is in range, and its friction.
     #[inline(always)]
-    pub(crate) fn of(count: u32, moving: [bool; 2], serial: bool) -> u32 {
+    pub(crate) fn of(head: u32, moving: [bool; 2], serial: bool) -> u32 {
         let sides = (u32::from(moving[0]) * MOVES[0]) | (u32::from(moving[1]) * MOVES[1]);
-        count & COUNT | sides | (u32::from(serial) * SERIAL)
+        head & (COUNT | FRICTION) | sides | (u32::from(serial) * SERIAL)
     }
 }
 
@@ -131,6 +136,7 @@ impl Block {
             body_a,
             body_b,
             count: self.count(lane),
+            friction: pair_friction(self.kind[lane]),
             normal: self.normal.each_ref().map(|row| row[lane]),
             position_a: self.position_a.each_ref().map(|row| row[lane]),
             position_b: self.position_b.each_ref().map(|row| row[lane]),

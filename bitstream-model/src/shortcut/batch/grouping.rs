@@ -6,6 +6,7 @@
 //! blocks are full and the order is the one received.
 
 use super::block::{LANES, Words, kind};
+use super::records::Head;
 use crate::cast::register;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::record::CONTACT_POINTS;
@@ -141,14 +142,14 @@ impl Places {
     }
 
     /// Places the next collisions, from `number` on, in one block until one shares a body with an
-    /// earlier one or is invalid. `heads` are their counts and bodies; their kinds are added to
+    /// earlier one or is invalid. Their kinds are added to
     /// `kinds`. Returns the block and the number of collisions placed, or `None` if another block has an
     /// empty lane.
     #[inline]
     pub(crate) fn place_together(
         &mut self,
         number: u32,
-        heads: impl Iterator<Item = [u32; 3]>,
+        heads: impl Iterator<Item = Head>,
         kinds: &mut Words<u32>,
     ) -> Option<(usize, usize)> {
         if self.open < self.taken.len() {
@@ -160,7 +161,8 @@ impl Places {
         let run = if after_firsts { 1 } else { RUN };
         let (mut lanes, mut firsts, mut distance) = (0_u8, 0_u8, self.distance);
         let together = self.together;
-        for ((number, [count, a, b]), kind) in (number..).zip(heads).zip(kinds) {
+        for ((number, head), kind) in (number..).zip(heads).zip(kinds) {
+            let Head { count, friction, bodies: [a, b] } = head;
             let (Some(&body_a), Some(&body_b)) = (bodies.get(a as usize), bodies.get(b as usize))
             else {
                 break;
@@ -184,7 +186,7 @@ impl Places {
                     bodies[at as usize] = Body { first, behind: block + 1, issue, moves: true };
                 }
             }
-            *kind = kind::of(count, [body_a.moves, body_b.moves], false);
+            *kind = kind::of(count | friction, [body_a.moves, body_b.moves], false);
             firsts += u8::from(first);
             lanes += 1;
         }

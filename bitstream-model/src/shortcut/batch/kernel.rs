@@ -13,6 +13,7 @@ use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
 
+use crate::accelerator::records::decode::pair_friction;
 use crate::accelerator::solver::SolverParameters;
 
 /// A body in memory: the linear velocity and the inverse mass, then the angular velocity
@@ -340,7 +341,12 @@ fn friction<A: Arithmetic>(
             arithmetic.splat(0.0).store(&mut block.impulses[k]);
         }
     }
-    let limit = arithmetic.splat(pass.parameters.friction) * arithmetic.load(&block.impulses[0]);
+    let friction = if pass.parameters.pair_friction {
+        arithmetic.of(F32x16::from_fn(|lane| pair_friction(block.kind[lane])))
+    } else {
+        arithmetic.splat(pass.parameters.friction)
+    };
+    let limit = friction * arithmetic.load(&block.impulses[0]);
     let tangents = tangents(arithmetic, q);
     for (k, t) in tangents.into_iter().enumerate() {
         let row = Row::new(minus_one, t, arm_a, arm_b, a, b);

@@ -118,6 +118,8 @@ pub(crate) struct Batch {
     entered: bool,
     /// Records that are put into their blocks when the threads have ended.
     put_off: Vec<Group>,
+    /// Whether the records of the step have the friction of their pair above the contact count.
+    pair_friction: bool,
 }
 
 impl Batch {
@@ -146,6 +148,7 @@ impl Batch {
             lines: Vec::new(),
             entered: false,
             put_off: Vec::with_capacity(PUT_OFF),
+            pair_friction: false,
         }
     }
 
@@ -156,8 +159,10 @@ impl Batch {
         self
     }
 
-    /// Begins a step: forgets the last step's collisions and makes room for `collisions`.
-    pub(crate) fn begin(&mut self, collisions: usize) {
+    /// Begins a step: forgets the last step's collisions and makes room for `collisions`, which with
+    /// `pair_friction` have the friction of their pair.
+    pub(crate) fn begin(&mut self, collisions: usize, pair_friction: bool) {
+        self.pair_friction = pair_friction;
         // Each part that is decoded needs some spare blocks at its end.
         let blocks = collisions.div_ceil(LANES) + 2 * LANES;
         self.blocks.reserve(blocks.saturating_sub(self.blocks.len()));

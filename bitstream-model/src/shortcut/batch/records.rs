@@ -19,6 +19,18 @@ pub(crate) const PLACES: [(usize, usize); collision::ROWS] =
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Records<'a> {
     pub(crate) streams: [&'a [Beat]; STREAMS],
+    /// Whether each has the friction of its pair above its contact count.
+    pub(crate) pair_friction: bool,
+}
+
+/// The words of a record that decide where it goes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Head {
+    /// Contact points, as received.
+    pub(crate) count: u32,
+    /// The friction of the pair, in its place above the contact count.
+    pub(crate) friction: u32,
+    pub(crate) bodies: [u32; 2],
 }
 
 impl<'a> Records<'a> {
@@ -34,16 +46,21 @@ impl<'a> Records<'a> {
         std::array::from_fn(|row| self.row(record, row))
     }
 
-    /// The number of contacts and the two bodies of records, from one on.
+    /// The heads of records, from one on.
     #[inline(always)]
-    pub(crate) fn heads(&self, first: usize) -> impl Iterator<Item = [u32; 3]> {
+    pub(crate) fn heads(&self, first: usize) -> impl Iterator<Item = Head> {
         const { assert!(collision::NORMAL == 0 && collision::BODY_A == 1 && collision::BODY_B == 2) };
+        let friction = if self.pair_friction { collision::FRICTION_BITS } else { 0 };
         let [normals, bodies_a, bodies_b, _] = self.streams;
         let from =
             |stream: &'a [Beat]| stream.split_arrays::<2>().0.get(first..).unwrap_or(&[]).iter();
         let word = |[beat, _]: &[Beat; 2]| beat.0[WORD_LANE];
         let bodies = from(bodies_a).zip(from(bodies_b));
-        from(normals).zip(bodies).map(move |(n, (a, b))| [word(n), word(a), word(b)])
+        from(normals).zip(bodies).map(move |(n, (a, b))| Head {
+            count: word(n) & !friction,
+            friction: word(n) & friction,
+            bodies: [word(a), word(b)],
+        })
     }
 }
 

@@ -34,6 +34,7 @@ const PARAMETERS: SolverParameters = SolverParameters {
     coefficient: 0.2,
     friction: 0.7,
     spin_damping: 0.1,
+    pair_friction: false,
 };
 
 const fn mass(inverse_mass: f32, inverse_inertia: f32) -> Mass {
@@ -89,7 +90,7 @@ impl Step {
     }
 
     fn decoded(&self, mut batch: Batch, cut: usize, masses: &[Mass]) -> Batch {
-        batch.begin(self.records.len());
+        batch.begin(self.records.len(), false);
         for part in [0..cut, cut..self.records.len()] {
             let streams = self.streams(part.clone());
             let streams = streams.each_ref().map(Vec::as_slice);
@@ -403,7 +404,7 @@ fn chain(pairs: &[[u32; 2]], bodies: usize, fixed: &[usize]) -> Step {
 fn two_static_bodies_are_refused() {
     let step = chain(&[[2, 1], [0, 1]], 3, &[0, 1]);
     let mut batch = Batch::new(1, true);
-    batch.begin(2);
+    batch.begin(2, false);
     let streams = step.streams(0..2);
     let error = PacketError { code: ErrorCode::StaticPair, channel: 0, beat: 1 };
     let streams = streams.each_ref().map(Vec::as_slice);

@@ -72,20 +72,21 @@ impl BodyRows<'_> {
         })
     }
 
-    /// Loads the bodies from `first` on. Returns the sum of their words, and the first body whose shape
-    /// is not in the table.
+    /// Loads the bodies from `first` on; with `kinematic`, bodies of inverse mass 0 have the velocity of
+    /// their record. Returns the sum of their words, and the first body whose shape is not in the table.
     fn load(
         &self,
         first: usize,
         masses: &[Mass],
         velocities: &mut [Velocity],
         shape_of: &mut [u8],
+        kinematic: bool,
     ) -> (u32, Option<usize>) {
         match self.turns.streams {
-            4 => self.load_from::<4>(first, masses, velocities, shape_of),
-            3 => self.load_from::<3>(first, masses, velocities, shape_of),
-            2 => self.load_from::<2>(first, masses, velocities, shape_of),
-            _ => self.load_from::<1>(first, masses, velocities, shape_of),
+            4 => self.load_from::<4>(first, masses, velocities, shape_of, kinematic),
+            3 => self.load_from::<3>(first, masses, velocities, shape_of, kinematic),
+            2 => self.load_from::<2>(first, masses, velocities, shape_of, kinematic),
+            _ => self.load_from::<1>(first, masses, velocities, shape_of, kinematic),
         }
     }
 
@@ -96,6 +97,7 @@ impl BodyRows<'_> {
         masses: &[Mass],
         velocities: &mut [Velocity],
         shape_of: &mut [u8],
+        kinematic: bool,
     ) -> (u32, Option<usize>) {
         let turns = Turns { streams: STREAMS };
         let (period, stride) = const { (period(STREAMS), period(STREAMS) * ROWS_IN / STREAMS) };
@@ -119,8 +121,8 @@ impl BodyRows<'_> {
                     wrong = wrong.into_iter().chain([first + body]).min();
                     continue;
                 };
-                // The words of a static body are ignored.
-                let moves = mass.inverse_mass != 0.0;
+                // The words of a body at rest are ignored.
+                let moves = mass.inverse_mass != 0.0 || kinematic;
                 velocities[body] = if moves { loaded } else { Velocity::default() };
                 shape_of[body] = shape;
             }
@@ -177,12 +179,13 @@ impl Deferred {
     ) -> Result<u32, PacketError> {
         let bodies = rows.first..rows.first + records;
         let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
+        let kinematic = accelerator.arguments.kinematic;
         let velocities = accelerator.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let shapes = accelerator.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
         let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
         batch.share(parts, |(first, (velocities, shapes))| {
-            let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes);
+            let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes, kinematic);
             sum.fetch_add(of_part, Ordering::Relaxed);
             wrong.fetch_min(wrong_body.unwrap_or(usize::MAX), Ordering::Relaxed);
         });

@@ -5,7 +5,7 @@
 //! buffer: the device owns it, and no one else writes to it.
 
 use super::eligible::{BEATS_MAX, Layout};
-use crate::accelerator::control::Shape;
+use crate::accelerator::control::{Arguments, Shape};
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
 use crate::accelerator::solver::Mass;
@@ -51,8 +51,9 @@ impl Decoded {
     }
 
     /// A step begins.
-    pub(super) fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) {
-        self.batch.begin(collisions);
+    pub(super) fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) {
+        let collisions = arguments.collisions as usize;
+        self.batch.begin(collisions, arguments.solver.pair_friction);
         self.masses.clear();
         self.masses.extend(shapes.iter().map(|shape| Mass {
             inverse_mass: shape.inverse_mass,

@@ -11,7 +11,7 @@ mod entered;
 mod passes;
 
 use crate::accelerator::Accelerator;
-use crate::accelerator::control::Shape;
+use crate::accelerator::control::{Arguments, Shape};
 use crate::accelerator::defer::{ArrivedRecords, Defer};
 use crate::accelerator::records::results::Results;
 use crate::accelerator::records::segment::{PacketError, Segment};
@@ -53,10 +53,10 @@ impl Deferred {
 }
 
 impl Defer for Deferred {
-    fn begin_step(&mut self, collisions: usize, shapes: &[Shape]) -> bool {
+    fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) -> bool {
         self.active = true;
         self.computed = 0;
-        self.decoded.begin_step(collisions, shapes);
+        self.decoded.begin_step(arguments, shapes);
         true
     }
 

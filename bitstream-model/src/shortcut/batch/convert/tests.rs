@@ -58,7 +58,8 @@ fn dealt(layout: &Layout, records: &[[Row; relative::ROWS]]) -> [Vec<Beat>; STRE
 
 /// Bodies, contact points, and the bits of all numbers.
 fn bits(collision: &Collision) -> ([u32; 2], usize, Vec<u32>) {
-    let Collision { body_a, body_b, count, normal, position_a, position_b, contacts } = collision;
+    let Collision { body_a, body_b, count, normal, position_a, position_b, contacts, .. } =
+        collision;
     let vectors = [normal, position_a, position_b].into_iter().flatten();
     let numbers = vectors.chain(contacts.as_flattened());
     ([*body_a, *body_b], *count, numbers.map(|number| number.to_bits()).collect())
@@ -78,7 +79,7 @@ fn what_is_taken_in_is_what_the_decoder_makes_of_each() {
             let mut shape_of = vec![1; BODIES as usize];
             shape_of[0] = 0;
             let masses = [0.0, 1.0].map(|mass| Mass { inverse_mass: mass, ..Mass::default() });
-            batch.begin(count);
+            batch.begin(count, false);
             let mut sums = vec![0; count];
             let decoded =
                 translation.decode(&mut batch, streams, count, &shape_of, &masses, &mut sums);
@@ -119,7 +120,7 @@ fn what_comes_before_a_refused_record_is_there() {
         let dealt = dealt(&layout, &records);
         let streams = dealt.each_ref().map(Vec::as_slice);
         let mut batch = Batch::new(2, true);
-        batch.begin(records.len());
+        batch.begin(records.len(), false);
         let mut sums = vec![0; records.len()];
         let shape_of = vec![1; BODIES as usize];
         let found =
@@ -189,7 +190,7 @@ fn pairs_are_taken_in_as_the_decoder_makes_them_and_what_pads_the_last_is_not() 
         let (dealt, expected_sums) = dealt_in_pairs(&layout, &records);
         let streams = dealt.each_ref().map(Vec::as_slice);
         let mut sums = vec![u32::MAX; count];
-        batch.begin(count);
+        batch.begin(count, false);
         let decoded = translation.decode(&mut batch, streams, count, &shape_of, &masses, &mut sums);
         assert_eq!((decoded, batch.len()), (Ok(()), count));
         for (index, rows) in records[..count].iter().enumerate() {
@@ -218,7 +219,7 @@ fn a_refused_record_ends_what_is_there_in_the_middle_of_a_pair_too() {
         let mut translation = Translation::new(layout);
         let mut batch = Batch::new(2, true).of(layout.precision, PAIR);
         let mut sums = vec![0; records.len()];
-        batch.begin(records.len());
+        batch.begin(records.len(), false);
         let (count, shapes) = (records.len(), &shape_of);
         let found = translation.decode(&mut batch, streams, count, shapes, &masses, &mut sums);
         let error = PacketError { code: ErrorCode::ContactCount, channel: 0, beat: register(bad) };

@@ -12,7 +12,7 @@ use pgs_support::Crew;
 use super::block::{self, Block, LANES, Words};
 use super::grouping::Places;
 use super::queue::Queue;
-use super::records::{Fill, Records, sum};
+use super::records::{Fill, Head, Records, sum};
 use super::width::Width;
 use super::{Batch, NO_SLOT};
 use crate::accelerator::records::segment::PacketError;
@@ -142,8 +142,8 @@ impl<'a> Intake<'a, '_> {
             kinds: [0; LANES],
         };
         let records = self.records;
-        for [_, body_a, body_b] in records.heads(self.at + LANES).take(LANES) {
-            self.places.fetch([body_a, body_b]);
+        for head in records.heads(self.at + LANES).take(LANES) {
+            self.places.fetch(head.bodies);
         }
         let heads = records.heads(self.at).take(most);
         let number = register(group.slot);
@@ -155,8 +155,8 @@ impl<'a> Intake<'a, '_> {
                 return (group, Some(block));
             }
         }
-        for [count, body_a, body_b] in records.heads(self.at).take(most).skip(group.count) {
-            match self.place(count, [body_a, body_b]) {
+        for head in records.heads(self.at).take(most).skip(group.count) {
+            match self.place(head) {
                 Ok(kind) => group.kinds[group.count] = kind,
                 Err(error) => {
                     self.refused = Some(error);
@@ -170,7 +170,8 @@ impl<'a> Intake<'a, '_> {
     }
 
     /// Places the next collision; returns the kind of its lane, 0 for a padding entry.
-    fn place(&mut self, count: u32, bodies: [u32; 2]) -> Result<u32, PacketError> {
+    fn place(&mut self, head: Head) -> Result<u32, PacketError> {
+        let Head { count, friction, bodies } = head;
         let index = register(self.slots.len());
         if count == 0 {
             self.slots.push(NO_SLOT);
@@ -180,7 +181,7 @@ impl<'a> Intake<'a, '_> {
         let moving = self.places.moving(count, bodies).map_err(error)?;
         let place = self.places.place(index, bodies, moving);
         self.slots.push(register(place.block * LANES + place.lane));
-        Ok(block::kind::of(count, moving, place.serial))
+        Ok(block::kind::of(count | friction, moving, place.serial))
     }
 }
 
@@ -204,7 +205,7 @@ impl Batch {
         self.bodies = self.bodies.max(shape_of.len());
         self.measured = false;
         self.spins = false;
-        let records = Records { streams };
+        let records = Records { streams, pair_friction: self.pair_friction };
         let mut at = 0;
         while at < count {
             // A group begins at most one block for each of its records.

@@ -90,7 +90,7 @@ impl Scene {
 
     /// The same by a batch, in two parts.
     fn shared(&self, batch: &mut Batch, cut: usize) -> Found {
-        batch.begin(self.records.len());
+        batch.begin(self.records.len(), false);
         let mut sums = vec![0; self.records.len()];
         let mut result = Ok(());
         for part in [0..cut, cut..self.records.len()] {

@@ -17,6 +17,7 @@ use crate::accelerator::integrate::{Integration, integrate};
 use crate::accelerator::records::array::Row;
 use crate::accelerator::records::decode;
 use crate::accelerator::records::striping::{ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
+use crate::accelerator::solver::Velocity;
 use crate::shortcut::deferred::bodies::{BodyRows, beats_of_results, period};
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
@@ -126,8 +127,12 @@ impl Bodies<'_> {
             let mut pose = decode::pose(StreamFormat::F32, &rows);
             let (line, second) = (&self.lines[body / 2], body % 2 == 1);
             let mut velocity = line.velocity(second);
-            if let Some(integration) = self.integration.filter(|_| line.moves(second)) {
-                (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
+            if let Some(integration) = self.integration {
+                if line.moves(second) {
+                    (pose, velocity) = integrate::<Single>(integration, &pose, &velocity);
+                } else if velocity != Velocity::default() {
+                    (pose, _) = integrate::<Single>(&integration.undamped(), &pose, &velocity);
+                }
             }
             let result = decode::result(StreamFormat::F32, &pose, &velocity);
             sums[0] = sums[0].wrapping_add(added(&rows));
@@ -235,6 +240,9 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
             let [px, py, pz, unused] = instructions.load(&poses[k][came * at + number..], came);
             let (k, number) = turns.place(ROWS_IN * body + 1);
             let [qx, qy, qz, qw] = instructions.load(&poses[k][came * at + number..], came);
+            // A body of inverse mass 0 keeps its velocity, and stays where it is if that is 0.
+            let held = m.is(zero);
+            let damping = one.or(held, damping);
             let [wx, wy, wz] = [before[0] * damping, before[1] * damping, before[2] * damping];
 
             let [factor, c] = constants.rotation([wx, wy, wz]);
@@ -245,7 +253,8 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
             let rw = ((c * qw - x * qx) - y * qy) - z * qz;
             let scale = one / (((rx * rx + ry * ry) + rz * rz) + rw * rw).sqrt();
 
-            let rests = m.is(zero);
+            let speeds = [vx, vy, vz, before[0], before[1], before[2]];
+            let rests = speeds.into_iter().fold(held, |rests, speed| rests.and(speed.is(zero)));
             let results = [
                 [
                     px.or(rests, px + vx * dt),
@@ -260,12 +269,12 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
                     qw.or(rests, rw * scale),
                 ],
                 [
-                    vx.or(rests, vx + fall[0]),
-                    vy.or(rests, vy + fall[1]),
-                    vz.or(rests, vz + fall[2]),
+                    vx.or(held, vx + fall[0]),
+                    vy.or(held, vy + fall[1]),
+                    vz.or(held, vz + fall[2]),
                     zero,
                 ],
-                [before[0].or(rests, wx), before[1].or(rests, wy), before[2].or(rests, wz), zero],
+                [before[0].or(held, wx), before[1].or(held, wy), before[2].or(held, wz), zero],
             ];
             for row in [[px, py, pz, unused], [qx, qy, qz, qw]] {
                 totals[0] = row.into_iter().fold(totals[0], F32x16::with_words);

@@ -62,7 +62,7 @@ fn results(
         }
     }
     let mut batch = Batch::with_width(threads, width);
-    batch.begin(0);
+    batch.begin(0, false);
     batch.enter(&velocities, &shape_of, &masses);
     let mut places = [const { Vec::new() }; STREAMS_MAX];
     for (place, beats) in places.iter_mut().zip(beats_of_results(turns, bodies.clone())) {
