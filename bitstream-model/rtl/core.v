@@ -21,6 +21,7 @@ module core (
   input  wire [7:0]   contact_iterations,
   input  wire [7:0]   friction_iterations,
   input  wire         integrate,
+  input  wire         kinematic,
   input  wire [31:0]  time_step,
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
@@ -152,7 +153,7 @@ module core (
   generate
     for (k = 0; k < 2; k = k + 1) begin : g_loader
       loader #(.BODY(BODY), .SHAPE(SHAPE), .ODD(k)) side (
-        .clk(clk), .start(clear), .run(loading), .bodies(bodies),
+        .clk(clk), .start(clear), .run(loading), .bodies(bodies), .kinematic(kinematic),
         .linear_there(there[2*k]), .linear(head[2*k]),
         .angular_there(there[2*k+1]), .angular(head[2*k+1]),
         .ready(load_ready[k]), .other_ready(load_ready[1-k]), .pop(loads[k]), .finished(load_finished[k]),
@@ -379,14 +380,16 @@ module core (
 
   wire [3:0]   room;
   wire         pop_even, pop_odd;
-  wire         body_valid, body_moves;
+  wire         body_valid, body_free;
+  wire [31:0]  body_damping;
   integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (
-    .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .bodies(bodies), .room(&room),
+    .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .damping(damping),
+    .bodies(bodies), .room(&room),
     .even_there(there[0] & there[1]), .even_pose({head[1], head[0]}),
     .odd_there(there[2] & there[3]), .odd_pose({head[3], head[2]}),
     .pop_even(pop_even), .pop_odd(pop_odd), .enters(enters), .finished(enter_finished),
     .address(entering), .shape_moves(shape_moves[0]),
-    .valid(body_valid), .pose(body_pose), .moves(body_moves)
+    .valid(body_valid), .pose(body_pose), .free(body_free), .body_damping(body_damping)
   );
 
   wire [95:0]  new_position, new_linear, new_angular;
@@ -394,8 +397,9 @@ module core (
   integration integration_pipeline (
     .clk(clk),
     .position(body_pose[95:0]), .orientation(body_pose[255:128]),
-    .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .moves(body_moves),
-    .time_step(time_step), .damping(damping), .gravity_step(gravity_step),
+    .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .damping(body_damping),
+    .integrates(integrate), .free(body_free),
+    .time_step(time_step), .gravity_step(gravity_step),
     .half_step(half_step), .series(series), .speed_limit(speed_limit),
     .out_position(new_position), .out_orientation(new_orientation),
     .out_linear(new_linear), .out_angular(new_angular)

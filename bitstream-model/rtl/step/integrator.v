@@ -10,6 +10,7 @@ module integrator #(
   input  wire            start,
   input  wire            run,
   input  wire            integrate,    // 0: all bodies keep their state
+  input  wire [31:0]     damping,
   input  wire [19:0]     bodies,
 
   input  wire            room,         // all senders have
@@ -28,9 +29,11 @@ module integrator #(
   // Cycle 0 of the pipeline.
   output wire            valid,
   output wire [255:0]    pose,
-  output wire            moves
+  output wire            free,         // the body has a mass, and is integrated
+  output wire [31:0]     body_damping  // of its spin: 1 without a mass
 );
   localparam SHAPE_LATENCY = 3;
+  localparam [31:0] ONE = 32'h3f800000;
 
   reg [19:0] body, left;
   reg        valid_s1;
@@ -56,11 +59,16 @@ module integrator #(
     pose_s1  <= odd ? odd_pose : even_pose;
   end
 
-  wire moves_now = shape_moves & integrate;
+  reg        free_now;
+  reg [31:0] damping_now;
+  always @(posedge clk) begin
+    free_now    <= shape_moves & integrate;
+    damping_now <= shape_moves ? damping : ONE;
+  end
   timed_flag #(.STAGES(READ_LATENCY)) valid_late (.clk(clk), .clear(start), .d(valid_s1), .q(valid));
   pipeline_register #(.WIDTH(256), .STAGES(READ_LATENCY)) pose_late (.clk(clk), .d(pose_s1), .q(pose));
-  pipeline_register #(.WIDTH(1), .STAGES(READ_LATENCY - SHAPE_LATENCY)) moves_late (
-    .clk(clk), .d(moves_now), .q(moves)
+  pipeline_register #(.WIDTH(33), .STAGES(READ_LATENCY - SHAPE_LATENCY - 1)) free_late (
+    .clk(clk), .d({free_now, damping_now}), .q({free, body_damping})
   );
 endmodule
 

@@ -2,7 +2,8 @@
 // bodies a cycle: the even one from streams 0 and 1 through port A, the odd one from streams 2 and 3
 // through port B. Both enter together: a load takes one cycle a pair.
 //
-// A static body is at rest because of its shape: its stored velocity is 0.
+// A body of inverse mass 0 is at rest because of its shape: its stored velocity is 0, unless such bodies may
+// move in this step.
 `default_nettype none
 
 module loader #(
@@ -14,6 +15,7 @@ module loader #(
   input  wire            start,
   input  wire            run,
   input  wire [19:0]     bodies,
+  input  wire            kinematic,       // bodies of inverse mass 0 may move
 
   input  wire            linear_there,    // the oldest beats of both streams
   input  wire [127:0]    linear,
@@ -49,7 +51,7 @@ module loader #(
   assign ready    = finished | (linear_there & angular_there);
   assign pop      = run & ~finished & ready & other_ready;
   wire unused = &{1'b0, angular[127:96]};
-  assign velocity = lookup_moves ? velocity_s2 : 192'd0;
+  assign velocity = (lookup_moves | kinematic) ? velocity_s2 : 192'd0;
 
   always @(posedge clk) begin
     share    <= (bodies + ((ODD == 0) ? 20'd1 : 20'd0)) >> 1;

@@ -44,8 +44,8 @@ pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "a static body keeps the velocity of its words",
         file: "loader.v",
-        right: "lookup_moves ? velocity_s2 : 192'd0",
-        wrong: "lookup_moves | 1'b1 ? velocity_s2 : 192'd0",
+        right: "(lookup_moves | kinematic) ? velocity_s2 : 192'd0",
+        wrong: "(lookup_moves | 1'b1) ? velocity_s2 : 192'd0",
     },
     Mutation {
         name: "TLAST of the results comes one beat early",

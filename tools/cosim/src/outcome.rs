@@ -8,12 +8,12 @@ use pgs_interface::control::{
     ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, RESET, SHAPE_STRIDE,
     SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES,
-    ap_ctrl,
+    ap_ctrl, flags,
 };
 use pgs_interface::register::Register;
 
 use crate::packets::{Beats, STREAMS};
-use crate::scene::Scene;
+use crate::scene::{Arguments, Scene};
 
 /// Clocks between two exchanges of beats.
 const BATCH: u32 = 64;
@@ -157,6 +157,12 @@ pub(crate) fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), Ext
     Ok(())
 }
 
+/// The switches of a step.
+fn flags_of(arguments: &Arguments) -> u32 {
+    let word = flags::INTEGRATE.put(0, arguments.integrate.into());
+    flags::KINEMATIC.put(word, arguments.kinematic.into())
+}
+
 pub(crate) fn set_up(
     accelerator: &mut dyn ExternalAccelerator,
     scene: &Scene,
@@ -170,7 +176,7 @@ pub(crate) fn set_up(
         (COLLISIONS, count(scene.collisions.len())),
         (CONTACT_ITERATIONS, arguments.contact_iterations),
         (FRICTION_ITERATIONS, arguments.friction_iterations),
-        (FLAGS, control::flags::INTEGRATE.put(0, arguments.integrate.into())),
+        (FLAGS, flags_of(arguments)),
         (TIME_STEP, time_step),
         (POSITION_DRIFT, drift),
         (POSITION_COEFFICIENT, coefficient),

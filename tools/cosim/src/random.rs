@@ -168,6 +168,7 @@ pub fn case(seed: u64) -> Case {
         contact_iterations: iterations(&mut draw),
         friction_iterations: iterations(&mut draw),
         integrate: !draw.one_in(5),
+        kinematic: false,
         numbers: [
             (1.0_f32 / 60.0).to_bits(),
             draw.number(0.02).abs().to_bits(),
@@ -203,6 +204,7 @@ pub fn case(seed: u64) -> Case {
         let [.., spin_damping] = &mut case.scene.arguments.numbers;
         *spin_damping = share.to_bits();
     }
+    case.scene.arguments.kinematic = draw.one_in(2);
     case
 }
 

@@ -48,6 +48,7 @@ pub fn scene(folder: &Folder) -> Scene {
             contact_iterations: parameters.contact_iterations,
             friction_iterations: parameters.friction_iterations,
             integrate: parameters.integrate,
+            kinematic: parameters.kinematic,
             numbers: [
                 parameters.time_step,
                 parameters.position_drift,

@@ -54,6 +54,7 @@ fn scene() -> Scene {
         contact_iterations: 2,
         friction_iterations: 2,
         integrate: true,
+        kinematic: false,
         numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
         gravity: [0, (-9.8_f32).to_bits(), 0],
     };

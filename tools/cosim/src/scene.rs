@@ -50,6 +50,8 @@ pub struct Arguments {
     pub friction_iterations: u32,
     /// Whether the bodies are integrated.
     pub integrate: bool,
+    /// Whether bodies without a mass move.
+    pub kinematic: bool,
     /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
     pub numbers: [u32; 6],
     /// Gravity.

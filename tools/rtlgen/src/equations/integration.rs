@@ -9,15 +9,16 @@
 //!
 //! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
-//! three components of g*dt. The arguments of the sine and of the cosine are the same number, for
+//! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at rest it
+//! keeps its pose, too. The arguments of the sine and of the cosine are the same number, for
 //! a factor of 0.5 is exact.
 
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
 
 use crate::graph::{Graph, Operand, Source, Vec3};
 
-/// The graph of the integration. `moves` is 0 for a body that keeps its state: a static one, or
-/// any body of a step without integration.
+/// The graph of the integration. `integrates` is 0 in a step without integration, where bodies keep
+/// their state; `free` is 1 for a body with a mass in a step with integration.
 #[must_use]
 pub fn integration() -> Graph {
     let mut graph = Graph::default();
@@ -26,9 +27,10 @@ pub fn integration() -> Graph {
     let orientation = g.input4(Source::Record, "orientation");
     let linear = g.input3(Source::Velocity, "linear");
     let angular = g.input3(Source::Velocity, "angular");
-    let moves = g.input(Source::Flag, "moves");
+    let damping = g.input(Source::Record, "damping");
+    let integrates = g.input(Source::Flag, "integrates");
+    let free = g.input(Source::Flag, "free");
     let time_step = g.input(Source::Argument, "time_step");
-    let damping = g.input(Source::Argument, "damping");
     let gravity = g.input3(Source::Argument, "gravity_step");
 
     let damped = g.within("damped", |g| g.scale(angular, damping));
@@ -38,23 +40,30 @@ pub fn integration() -> Graph {
     let way = g.within("way", |g| g.scale(linear, time_step));
     let moved = g.within("moved", |g| g.add3(position, way));
     let fallen = g.within("fallen", |g| g.add3(linear, gravity));
+    let moves = g.within("moves", |g| {
+        let speeds = linear.0.into_iter().chain(angular.0);
+        speeds.fold(free, |moves, speed| {
+            let under_way = g.non_zero(integrates, speed);
+            g.either(moves, under_way)
+        })
+    });
     output_if(g, moves, "position", moved.0, position.0);
     output_if(g, moves, "orientation", turned, orientation);
-    output_if(g, moves, "linear", fallen.0, linear.0);
-    output_if(g, moves, "angular", damped.0, angular.0);
+    output_if(g, free, "linear", fallen.0, linear.0);
+    output_if(g, free, "angular", damped.0, angular.0);
     graph
 }
 
-/// An output: the new values where `moves` is 1, else the old ones.
+/// An output: the new values where `changes` is 1, else the old ones.
 fn output_if<const N: usize>(
     g: &mut Graph,
-    moves: Operand,
+    changes: Operand,
     name: &str,
     new: [Operand; N],
     old: [Operand; N],
 ) {
     let chosen: Vec<_> =
-        new.into_iter().zip(old).map(|(new, old)| g.select(moves, new, old)).collect();
+        new.into_iter().zip(old).map(|(new, old)| g.select(changes, new, old)).collect();
     g.output(name, &chosen);
 }
 
