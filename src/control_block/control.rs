@@ -47,7 +47,8 @@ fn arguments(
 /// The switches of a step.
 fn flags_of(parameters: &StepParameters) -> u32 {
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
-    flags::KINEMATIC.put(word, parameters.kinematic.into())
+    let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
+    flags::PAIR_FRICTION.put(word, parameters.pair_friction.into())
 }
 
 /// The accelerator's control block.

@@ -353,7 +353,7 @@ mod tests {
     #[test]
     fn a_known_bitstream_is_described() {
         let found = identify_with(&[]).expect("well formed");
-        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 1)));
+        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 2)));
         assert!(found.checksums && found.interlocked && found.impulse_sum);
         assert!(!found.flush_subnormals);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));

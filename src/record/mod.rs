@@ -193,7 +193,7 @@ impl<'a> Counted<'a> {
     #[inline(always)]
     pub(crate) const fn count(self) -> u32 {
         // A constant after inlining where `full` is known: the code that depends on it folds, too.
-        if self.full { FULL } else { self.collision.count }
+        if self.full { FULL } else { self.collision.points() }
     }
 }
 

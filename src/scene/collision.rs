@@ -4,6 +4,8 @@
 pub use pgs_interface::record::CONTACT_POINTS;
 
 use bytemuck::{Pod, Zeroable};
+use half::f16;
+use pgs_interface::record::collision as layout;
 
 use super::Structures;
 use crate::simd::prefetch;
@@ -38,13 +40,47 @@ pub struct Collision {
     pub body_b: u32,
     /// Unit normal, world frame, pointing from B to A: the direction in which A is pushed.
     pub normal: [f32; 3],
-    /// Number of contact points, 1 to [`CONTACT_POINTS`].
+    /// Number of contact points, 1 to [`CONTACT_POINTS`], and the friction of the pair, if it has one
+    /// of its own: [`with_friction`](Self::with_friction) puts it above the number.
     pub count: u32,
     /// The contact points; the elements from `count` on are ignored.
     pub contacts: [Contact; CONTACT_POINTS],
 }
 
 impl Collision {
+    /// The collision with a friction coefficient of its own, rounded to binary16 (three digits, at
+    /// most 65504). A step uses it with
+    /// [`StepParameters::pair_friction`](crate::StepParameters::pair_friction), and refuses it
+    /// without, as it refuses one that is not finite. The sign is dropped.
+    #[must_use]
+    pub fn with_friction(self, friction: f32) -> Self {
+        let bits = u32::from(f16::from_f32(friction).to_bits()) << layout::FRICTION_SHIFT;
+        let count = (self.count & !layout::FRICTION_BITS) | (bits & layout::FRICTION_BITS);
+        Self { count, ..self }
+    }
+
+    /// Its own friction coefficient; 0 if it has none.
+    #[must_use]
+    pub fn friction(&self) -> f32 {
+        let bits = (self.count & layout::FRICTION_BITS) >> layout::FRICTION_SHIFT;
+        #[expect(clippy::cast_possible_truncation, reason = "fifteen bits")]
+        f16::from_bits(bits as u16).to_f32()
+    }
+
+    /// Whether its friction is a number: binary16 has all exponent bits set where it is none.
+    #[inline(always)]
+    pub(crate) const fn has_finite_friction(&self) -> bool {
+        const EXPONENT: u32 = 0x7C00 << layout::FRICTION_SHIFT;
+        self.count & EXPONENT != EXPONENT
+    }
+
+    /// The number of contact points, without the friction.
+    #[inline(always)]
+    #[must_use]
+    pub const fn points(&self) -> u32 {
+        self.count & !layout::FRICTION_BITS
+    }
+
     /// An entry without contact points, which has no effect.
     pub(crate) const NOTHING: Self = Self {
         body_a: 0,

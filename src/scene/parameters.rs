@@ -102,8 +102,11 @@ pub struct StepParameters {
     pub position_drift: f32,
     /// Share of the penetration that a step removes (Bullet: position coefficient).
     pub position_coefficient: f32,
-    /// Friction coefficient of every contact.
+    /// Friction coefficient of every contact, unless each collision has its own.
     pub friction: f32,
+    /// Whether each collision has a friction of its own
+    /// ([`Collision::with_friction`](crate::Collision::with_friction)); one without has 0.
+    pub pair_friction: bool,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
     /// Share of the spin about the normal that every friction pass takes from both bodies of a
@@ -181,6 +184,7 @@ impl Default for StepParameters {
             position_drift: 0.005,
             position_coefficient: 0.2,
             friction: 0.7,
+            pair_friction: false,
             angular_damping: 0.99,
             spin_damping: solver::SPIN_DAMPING,
             gravity: [0.0, -9.8, 0.0],

@@ -4,12 +4,14 @@ use super::InputError;
 use super::{all_within, first};
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
-/// Checks a collision without its bodies; returns their indices.
+/// Checks a collision without its bodies; returns their indices. With `pair_friction` it has a
+/// friction of its own.
 #[inline]
 pub(crate) fn check_collision(
     index: usize,
     collision: &Collision,
     bodies: usize,
+    pair_friction: bool,
 ) -> Result<(usize, usize), InputError> {
     let body = |side: char, found: u32| match usize::try_from(found) {
         Ok(body) if body < bodies => Ok(body),
@@ -19,12 +21,17 @@ pub(crate) fn check_collision(
     if pair.0 == pair.1 {
         return Err(InputError::SelfCollision { collision: index, body: collision.body_a });
     }
-    let count = match usize::try_from(collision.count) {
+    let points = if pair_friction { collision.points() } else { collision.count };
+    let count = match usize::try_from(points) {
         Ok(count @ 1..=CONTACT_POINTS) => count,
         _ => {
             return Err(InputError::ContactCount { collision: index, found: collision.count });
         }
     };
+    if !collision.has_finite_friction() {
+        let found = collision.friction();
+        return Err(InputError::FrictionNotFinite { collision: index, found });
+    }
     if !all_within(&collision.normal, f32::MAX) {
         let (component, found) = first(&collision.normal, |value| !value.is_finite());
         return Err(InputError::NormalNotFinite { collision: index, component, found });
@@ -87,8 +94,28 @@ mod tests {
         contacts: [USED, USED, USED, UNUSED],
     };
 
+    #[test]
+    fn a_friction_of_its_own_is_taken_where_it_is_asked_for() {
+        let own = COLLISION.with_friction(0.3);
+        assert_eq!((own.points(), own.count), (3, 0x34CD_0003));
+        assert!((own.friction() - 0.3).abs() < 1e-4);
+        assert_eq!(own.with_friction(0.0).count, COLLISION.count);
+        assert_eq!(check_collision(5, &own, 3, true), Ok((2, 0)));
+        let refused = InputError::ContactCount { collision: 5, found: own.count };
+        assert_eq!(check_collision(5, &own, 3, false), Err(refused));
+        let found = f32::INFINITY;
+        assert_eq!(
+            check_collision(5, &COLLISION.with_friction(7e4), 3, true),
+            Err(InputError::FrictionNotFinite { collision: 5, found })
+        );
+        // The sign bit is none of the friction's.
+        let negative = Collision { count: own.count | 1 << 31, ..own };
+        let refused = InputError::ContactCount { collision: 5, found: negative.count };
+        assert_eq!(check_collision(5, &negative, 3, true), Err(refused));
+    }
+
     fn refused(collision: &Collision) -> InputError {
-        check_collision(5, collision, 3).expect_err("a collision to be refused")
+        check_collision(5, collision, 3, false).expect_err("a collision to be refused")
     }
 
     #[test]
@@ -105,7 +132,7 @@ mod tests {
 
     #[test]
     fn what_an_unused_contact_point_holds_does_not_matter() {
-        assert_eq!(check_collision(0, &COLLISION, 3), Ok((2, 0)));
+        assert_eq!(check_collision(0, &COLLISION, 3, false), Ok((2, 0)));
     }
 
     #[test]
@@ -135,7 +162,7 @@ mod tests {
         let contacts = [USED; 4];
         for count in 1..=4 {
             let collision = Collision { count, contacts, ..COLLISION };
-            assert_eq!(check_collision(5, &collision, 3), Ok((2, 0)));
+            assert_eq!(check_collision(5, &collision, 3, false), Ok((2, 0)));
         }
         for found in [0, 5, u32::MAX] {
             assert_eq!(
@@ -177,7 +204,7 @@ mod tests {
         );
         for length in [0.999_1, 1.000_9] {
             let collision = Collision { normal: [0.0, 0.0, length], ..COLLISION };
-            assert_eq!(check_collision(5, &collision, 3), Ok((2, 0)));
+            assert_eq!(check_collision(5, &collision, 3, false), Ok((2, 0)));
         }
     }
 

@@ -119,6 +119,18 @@ pub enum InputError {
         found: f32,
     },
 
+    /// The friction of a collision is not finite.
+    #[error(
+        "collision {collision}: its friction is {found}, expected a finite number: binary16 ends at \
+         65504"
+    )]
+    FrictionNotFinite {
+        /// The collision.
+        collision: usize,
+        /// Its friction.
+        found: f32,
+    },
+
     /// A body refers to a shape that was not set.
     #[error(
         "body {body}: its shape is {found}, but the table has {shapes} shapes, counted from 0: \

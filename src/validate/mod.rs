@@ -154,8 +154,9 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     check_shapes(shapes, &needs, limits)?;
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
-    let kinematic = parameters.kinematic;
-    Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals, kinematic })
+    let StepParameters { kinematic, pair_friction, .. } = *parameters;
+    let variant = &limits.variant;
+    Ok(Scene { shapes, needs, variant, held, flush_subnormals, kinematic, pair_friction })
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
@@ -166,7 +167,8 @@ fn check_whole<'a>(
     end: impl Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
-    let (body_a, body_b) = check_collision(index, collision, scene.needs.bodies)?;
+    let (body_a, body_b) =
+        check_collision(index, collision, scene.needs.bodies, scene.pair_friction)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
     let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
     let moves = shapes.map(|shape| !shape.is_static());
@@ -199,6 +201,8 @@ pub(crate) struct Scene<'a> {
     flush_subnormals: bool,
     /// Whether static bodies may move.
     kinematic: bool,
+    /// Whether each collision has a friction of its own.
+    pair_friction: bool,
 }
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
@@ -280,8 +284,9 @@ pub(crate) mod tests {
     /// The context of checks on a bitstream of `variant`.
     pub(crate) fn scene_on(variant: &Variant, flush_subnormals: bool) -> Scene<'_> {
         let held = Held::by(&variant.numbers);
-        let kinematic = false;
-        Scene { shapes: &SHAPES, needs: NEEDS, variant, held, flush_subnormals, kinematic }
+        let (kinematic, pair_friction) = (false, false);
+        let (shapes, needs) = (&SHAPES, NEEDS);
+        Scene { shapes, needs, variant, held, flush_subnormals, kinematic, pair_friction }
     }
 
     fn body(shape: u32) -> Body {

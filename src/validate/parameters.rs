@@ -51,9 +51,21 @@ pub(crate) fn check_parameters(
         let excess = Excess::Extension { parameter, found, known: SPIN_DAMPING };
         return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
     }
-    if parameters.kinematic && !limits.extensions.kinematic {
-        let excess = Excess::Lacks { extension: "static bodies that move" };
-        return Err(needs.refuse(excess, |variant| Extensions::possible(variant).kinematic));
+    let extensions = limits.extensions;
+    let asked: [(&str, bool, bool, fn(Extensions) -> bool); 2] = [
+        ("static bodies that move", parameters.kinematic, extensions.kinematic, |of| of.kinematic),
+        (
+            "a friction for each collision",
+            parameters.pair_friction,
+            extensions.pair_friction,
+            |of| of.pair_friction,
+        ),
+    ];
+    for (extension, wanted, there, can) in asked {
+        if wanted && !there {
+            let excess = Excess::Lacks { extension };
+            return Err(needs.refuse(excess, |variant| can(Extensions::possible(variant))));
+        }
     }
     if computes_short(&limits.variant.numbers) {
         let (format, component) = (StreamFormat::Binary16, 0);

@@ -153,7 +153,9 @@ impl<'a> Quick<'a> {
         for collision in block.collisions.iter() {
             let padding = is_padding(collision);
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
-            good &= padding | head(collision, ends);
+            let points =
+                if self.scene.pair_friction { collision.points() } else { collision.count };
+            good &= padding | (head(collision, points, ends) & collision.has_finite_friction());
             paddings += usize::from(padding);
         }
         (good, paddings)
@@ -201,11 +203,11 @@ pub(crate) struct Block<'a, L> {
 
 /// Whether normal, count and bodies of a collision are surely right.
 #[inline(always)]
-fn head(collision: &Collision, [a, b]: [&End; 2]) -> bool {
+fn head(collision: &Collision, points: u32, [a, b]: [&End; 2]) -> bool {
     let [x, y, z] = collision.normal;
     let square = x * x + y * y + z * z;
     ((square - 1.0).abs() <= OFF_UNIT)
-        & (collision.count.wrapping_sub(1) < FULL)
+        & (points.wrapping_sub(1) < FULL)
         & (collision.body_a != collision.body_b)
         & a.has_shape()
         & b.has_shape()

@@ -148,7 +148,7 @@ fn contact_pass(
     impulses: &mut Impulses,
     parameters: &StepParameters,
 ) {
-    let count = collision.count as usize;
+    let count = collision.points() as usize;
     for (contact, sum) in collision.contacts[..count].iter().zip(&mut impulses.normal) {
         let row = Row::new(collision.normal, contact.point, a, b);
         if row.j == 0.0 {
@@ -171,13 +171,15 @@ fn friction_pass(
     impulses: &mut Impulses,
     parameters: &StepParameters,
 ) {
-    let points = &collision.contacts[..collision.count as usize];
+    let points = &collision.contacts[..collision.points() as usize];
     let sum = points[1..].iter().fold(points[0].point, |sum, contact| add(sum, contact.point));
     #[expect(clippy::cast_precision_loss, reason = "1 to 4")]
-    let centre = scale(sum, 1.0 / collision.count as f32);
+    let centre = scale(sum, 1.0 / collision.points() as f32);
     let q = neg(collision.normal);
     let [l0, l1, l2, l3] = impulses.normal;
-    let limit = parameters.friction * (((l0 + l1) + l2) + l3);
+    let own = collision.friction();
+    let mu = if parameters.pair_friction { own } else { parameters.friction };
+    let limit = mu * (((l0 + l1) + l2) + l3);
     for (t, sum) in tangents(q).into_iter().zip(&mut impulses.tangential) {
         let row = Row::new(t, centre, a, b);
         let l = row.speed(a, b) * row.j;

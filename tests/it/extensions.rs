@@ -88,6 +88,24 @@ fn with_platforms(seed: u64) -> (Vec<Body>, Vec<Collision>) {
 }
 
 #[test]
+fn each_pair_has_its_own_friction() {
+    let (bodies, mut collisions) = scene(23);
+    for (number, collision) in (0_u16..).zip(&mut collisions) {
+        *collision = collision.with_friction(f32::from(number % 9) * 0.15);
+    }
+    let mut parameters = ordered(Order::AsGiven);
+    parameters.pair_friction = true;
+    for shapes in both_inertias() {
+        let scene = (bodies.clone(), collisions.clone());
+        let own = compare(&scene, &shapes, &parameters);
+        // The parameter for all pairs does not count.
+        let mut other = parameters;
+        other.friction = 0.1;
+        assert_eq!(compare(&scene, &shapes, &other), own);
+    }
+}
+
+#[test]
 fn static_bodies_move_as_the_formulae_say() {
     for integrate in [true, false] {
         let mut parameters = ordered(Order::AsGiven);
@@ -180,9 +198,12 @@ fn a_board_of_version_1_1_refuses_each_extension_by_name() {
     let [mut no_spin, mut moving] = [StepParameters::default(); 2];
     no_spin.spin_damping = 0.0;
     moving.kinematic = true;
+    let mut own = StepParameters::default();
+    own.pair_friction = true;
     let asked = [
         (no_spin, "the spin damping is 0, and this bitstream"),
         (moving, "the step asks for static bodies that move, which this bitstream"),
+        (own, "the step asks for a friction for each collision, which this bitstream"),
     ];
     for (parameters, begins) in asked {
         let mut found = bodies.clone();

@@ -21,7 +21,7 @@ use cosim::refusal::{Refusal, refusals};
 use cosim::{random, recorded};
 use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, error};
 use pgs_interface::register::Register;
-use rtlgen::design::{Design, Parameters};
+use rtlgen::design::{Design, EXTENSIONS, Parameters};
 use rtlgen::emit::{self, File};
 use rtlgen::simulator::Waveform;
 use rtlgen::{simulator, verify};
@@ -88,7 +88,8 @@ impl HazardMode {
             Self::Interlocked => Hazards::Interlocked,
             Self::Unchecked => Hazards::Unchecked,
         };
-        BoardConfig { hazards, subnormals: Subnormals::Flush, ..Default::default() }
+        let subnormals = Subnormals::Flush;
+        BoardConfig { hazards, subnormals, extensions: EXTENSIONS, ..Default::default() }
     }
 }
 
