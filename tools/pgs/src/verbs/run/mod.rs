@@ -91,9 +91,9 @@ pub(crate) struct RunArgs {
 
 impl RunArgs {
     fn parameters(&self) -> StepParameters {
-        let mut parameters = StepParameters::default();
-        parameters.contact_iterations = ITERATIONS;
-        parameters.friction_iterations = ITERATIONS;
+        let parameters = StepParameters::default()
+            .with_contact_iterations(ITERATIONS)
+            .with_friction_iterations(ITERATIONS);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
