@@ -43,6 +43,7 @@
 //!   [`CollisionArrays`]), or the caller's own storage ([`Bodies`], [`Collisions`]).
 //! - [`Accelerator::step`] is [`Accelerator::submit`] and [`InFlight::wait`] in one call. A step that is
 //!   dropped, by a panic too, is stopped.
+//! - [`InFlight::detach`] lets a step go on without a borrow of its accelerator, for callers that own it.
 //! - [`InFlight::prepare`] packs another world's step while the board works, and
 //!   [`InFlight::wait_and_start`] starts it the moment that the board is free.
 //! - [`Accelerator::write`] takes each collision as the narrow phase finds it.
@@ -103,7 +104,8 @@ pub use scene::{
     Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
 };
 pub use step::{
-    Accelerator, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles, StepReport,
+    Accelerator, Detached, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles,
+    StepReport,
 };
 pub use validate::{CapableProfiles, Excess, InputError, InputItem, OutOfRange};
 
