@@ -6,7 +6,8 @@
 //!
 //! [`Accelerator::open`] finds a board, [`Accelerator::set_shapes`] loads the mass properties, and
 //! [`Accelerator::step`] solves the contacts of one time step and integrates it. Without a board
-//! all of it runs on a software-emulated one (feature `emulation`, on by default).
+//! all of it runs on a software-emulated one (feature `emulation`, on by default), which
+//! [`OpenOptions::emulated`] builds from one text.
 //!
 //! # A cube on the ground
 //!
@@ -73,6 +74,8 @@ pub mod bench;
 mod board;
 mod check;
 mod control_block;
+#[cfg(feature = "emulation")]
+pub mod emulation;
 mod error;
 mod fault;
 pub mod order;
@@ -87,10 +90,13 @@ pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };
 pub use beat::pack::writer::Writer;
+/// The emulated board itself: its configuration, its builder's handle, violations, faults.
+#[cfg(feature = "emulation")]
+pub use bitstream_model as model;
 pub use board::{BoardChoice, BoardDescription, BoardKind, Cancellation, OpenOptions};
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use control_block::{Capabilities, ControlError, IdentityError, Saturated};
-pub use error::{Aftermath, Error, OpenError};
+pub use error::{Aftermath, BoardTextError, Error, OpenError};
 pub use fault::{
     AcceleratorError, Awaited, ChannelState, ControlState, Diagnosis, Fault, Phase, Subject,
 };

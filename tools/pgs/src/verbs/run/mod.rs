@@ -124,9 +124,9 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut opened = board::open(common, &args.build)?;
+    let mut opened = board::open(common, &args.build.build())?;
     args.scene.check_size(opened.accelerator.capabilities())?;
-    let mut scene = args.scene.build(&args.build)?;
+    let mut scene = args.scene.build(&args.build.build())?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
