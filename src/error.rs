@@ -4,6 +4,8 @@ use thiserror::Error;
 
 use crate::axi_dma::DmaError;
 use crate::control_block::{ControlError, IdentityError};
+#[cfg(feature = "emulation")]
+use crate::emulation::BuildError;
 use crate::fault::{Diagnosis, Fault};
 use crate::platform::PlatformError;
 use crate::scene::ShapeError;
@@ -106,6 +108,37 @@ impl Error {
     }
 }
 
+impl From<BoardTextError> for Error {
+    fn from(error: BoardTextError) -> Self {
+        Self::Open(error.into())
+    }
+}
+
+/// A text that names no board.
+#[derive(Debug, Clone, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BoardTextError {
+    /// There is no such kind of board.
+    #[error(
+        "found {found:?} as a board: give auto, uio[:NODE], devmem, emulated[:BUILD] or socket:PATH"
+    )]
+    Unknown {
+        /// The text.
+        found: String,
+    },
+    /// The build of an emulated board is wrong.
+    #[cfg(feature = "emulation")]
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// An emulated board, here or in another process, and no emulation.
+    #[cfg(not(feature = "emulation"))]
+    #[error(
+        "an emulated board is asked for, and this build has none: name a real board, or build with \
+         the feature `emulation`"
+    )]
+    NoEmulation,
+}
+
 /// Why no board could be opened.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -119,6 +152,9 @@ pub enum OpenError {
         /// The missing node, in words.
         reason: String,
     },
+    /// The text that names the board is wrong.
+    #[error(transparent)]
+    Text(#[from] BoardTextError),
     /// Memory was chosen for an emulated board.
     #[error("an emulated board has memory of its own: leave out the choice of memory")]
     EmulatedMemory,

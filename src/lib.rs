@@ -6,7 +6,8 @@
 //!
 //! [`Accelerator::open`] finds a board, [`Accelerator::set_shapes`] loads the mass properties, and
 //! [`Accelerator::step`] solves the contacts of one time step and integrates it. Without a board
-//! all of it runs on a software-emulated one (feature `emulation`, on by default).
+//! all of it runs on a software-emulated one (feature `emulation`, on by default), which
+//! [`OpenOptions::emulated`] builds from one text.
 //!
 //! # A cube on the ground
 //!
@@ -43,6 +44,7 @@
 //!   [`CollisionArrays`]), or the caller's own storage ([`Bodies`], [`Collisions`]).
 //! - [`Accelerator::step`] is [`Accelerator::submit`] and [`InFlight::wait`] in one call. A step that is
 //!   dropped, by a panic too, is stopped.
+//! - [`InFlight::detach`] lets a step go on without a borrow of its accelerator, for callers that own it.
 //! - [`InFlight::prepare`] packs another world's step while the board works, and
 //!   [`InFlight::wait_and_start`] starts it the moment that the board is free.
 //! - [`Accelerator::write`] takes each collision as the narrow phase finds it.
@@ -72,6 +74,8 @@ pub mod bench;
 mod board;
 mod check;
 mod control_block;
+#[cfg(feature = "emulation")]
+pub mod emulation;
 mod error;
 mod fault;
 pub mod order;
@@ -86,10 +90,13 @@ pub use axi_dma::{
     ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
 };
 pub use beat::pack::writer::Writer;
+/// The emulated board itself: its configuration, its builder's handle, violations, faults.
+#[cfg(feature = "emulation")]
+pub use bitstream_model as model;
 pub use board::{BoardChoice, BoardDescription, BoardKind, Cancellation, OpenOptions};
 pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use control_block::{Capabilities, ControlError, IdentityError, Saturated};
-pub use error::{Aftermath, Error, OpenError};
+pub use error::{Aftermath, BoardTextError, Error, OpenError};
 pub use fault::{
     AcceleratorError, Awaited, ChannelState, ControlState, Diagnosis, Fault, Phase, Subject,
 };
@@ -103,7 +110,8 @@ pub use scene::{
     Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
 };
 pub use step::{
-    Accelerator, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles, StepReport,
+    Accelerator, Detached, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles,
+    StepReport,
 };
 pub use validate::{CapableProfiles, Excess, InputError, InputItem, OutOfRange};
 

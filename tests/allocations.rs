@@ -81,8 +81,7 @@ fn open_for(config: BoardConfig, pack_threads: Option<usize>) -> Accelerator {
 fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
-    let mut parameters = StepParameters::default();
-    parameters.order = order;
+    let parameters = StepParameters::default().with_order(order);
     let mut counted = Vec::with_capacity(10);
     for step in 0..10 {
         // The number of collisions changes, as it does in a moving scene.
@@ -99,8 +98,7 @@ fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
 fn allocations_prepared(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
-    let mut parameters = StepParameters::default();
-    parameters.order = order;
+    let parameters = StepParameters::default().with_order(order);
     let mut counted = Vec::with_capacity(10);
     let mut flight =
         accelerator.submit(&bodies, &collisions, &parameters).expect("nothing disturbs it");

@@ -4,6 +4,7 @@ pub(crate) mod anomalies;
 pub(crate) mod bank;
 pub(crate) mod bring_up;
 pub(crate) mod cancellation;
+mod choice_text;
 pub(crate) mod completion;
 pub(crate) mod device;
 pub(crate) mod open;

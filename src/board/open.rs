@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use pgs_interface::address_map::UIO_NODE;
 
+#[cfg(feature = "emulation")]
+use crate::error::BoardTextError;
 use crate::error::OpenError;
 use crate::platform::linux::uio_listing::uio_listing;
 use crate::platform::{
@@ -38,7 +40,32 @@ pub struct OpenOptions {
     pub pack_threads: Option<usize>,
 }
 
-/// Which board to open.
+impl OpenOptions {
+    /// Opens a new emulated board that is built as the text describes:
+    /// `"float,world,threads=1"`, for example. The page of [`emulation`](crate::emulation) has all
+    /// options.
+    ///
+    /// ```
+    /// use zynq_pgs::{Accelerator, OpenOptions};
+    ///
+    /// # fn main() -> Result<(), zynq_pgs::Error> {
+    /// let accelerator = Accelerator::open(OpenOptions::emulated("half,flush")?)?;
+    /// assert_eq!(accelerator.capabilities().variant.profile.name, "half");
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`BoardTextError::Build`]: the text describes no build.
+    #[cfg(feature = "emulation")]
+    pub fn emulated(build: &str) -> Result<Self, BoardTextError> {
+        let build: crate::emulation::Build = build.parse()?;
+        Ok(Self { board: BoardChoice::Built(build.config()), ..Self::default() })
+    }
+}
+
+/// Which board to open. [`parse`](str::parse) reads it from a text: `auto`, `uio[:NODE]`, `devmem`,
+/// `emulated[:BUILD]` or `socket:PATH`.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub enum BoardChoice {
@@ -54,7 +81,11 @@ pub enum BoardChoice {
     },
     /// Registers through `/dev/mem`, inside these windows only. This way has no interrupt.
     DevMem(DevMemWindows),
-    /// An emulated board.
+    /// A new emulated board, built like this. To watch it or to make it fail, build it by hand and
+    /// open its port ([`Self::Emulated`]).
+    #[cfg(feature = "emulation")]
+    Built(bitstream_model::BoardConfig),
+    /// An emulated board that was built before.
     #[cfg(feature = "emulation")]
     Emulated(bitstream_model::CpuPort),
     /// An emulated board in another process, served at this Unix socket
@@ -146,6 +177,8 @@ pub(crate) fn find(
             real(registers, BoardKind::DevMem, "/dev/mem", "asked for")
         }
         #[cfg(feature = "emulation")]
+        BoardChoice::Built(config) => own_memory(memory).and_then(|()| built(*config, "asked for")),
+        #[cfg(feature = "emulation")]
         BoardChoice::Emulated(port) => {
             own_memory(memory).map(|()| emulated(port.clone(), "asked for"))
         }
@@ -165,7 +198,13 @@ fn own_memory(memory: &MemoryChoice) -> Result<(), OpenError> {
 #[cfg(feature = "emulation")]
 fn fall_back(reason: &str) -> Result<Found, OpenError> {
     log::warn!("{reason}: using the software-emulated board");
-    let board = bitstream_model::EmulatedBoard::new(bitstream_model::BoardConfig::default())?;
+    built(bitstream_model::BoardConfig::default(), reason)
+}
+
+/// Builds an emulated board.
+#[cfg(feature = "emulation")]
+fn built(config: bitstream_model::BoardConfig, reason: &str) -> Result<Found, OpenError> {
+    let board = bitstream_model::EmulatedBoard::new(config)?;
     Ok(emulated(board.cpu_port(), reason))
 }
 

@@ -199,3 +199,135 @@ impl Default for StepParameters {
         }
     }
 }
+
+/// Setters that can be chained, for a value without a name:
+///
+/// ```
+/// use zynq_pgs::StepParameters;
+///
+/// let parameters = StepParameters::default().with_time_step(1.0 / 120.0).with_friction(0.5);
+/// assert_eq!(parameters.contact_iterations, 4, "the others stay");
+/// ```
+impl StepParameters {
+    /// Sets the [time step](Self::time_step), s.
+    #[must_use]
+    pub const fn with_time_step(self, time_step: f32) -> Self {
+        Self { time_step, ..self }
+    }
+
+    /// Sets the penetration that the solver leaves alone ([`Self::position_drift`]), m.
+    #[must_use]
+    pub const fn with_position_drift(self, position_drift: f32) -> Self {
+        Self { position_drift, ..self }
+    }
+
+    /// Sets the share of the penetration that a step removes ([`Self::position_coefficient`]), from
+    /// 0 to 1; the time step in seconds, where distances are [velocities](Self#a-distance-as-a-velocity).
+    #[must_use]
+    pub const fn with_position_coefficient(self, position_coefficient: f32) -> Self {
+        Self { position_coefficient, ..self }
+    }
+
+    /// Sets the [friction coefficient](Self::friction) of every contact; it has no unit.
+    #[must_use]
+    pub const fn with_friction(self, friction: f32) -> Self {
+        Self { friction, ..self }
+    }
+
+    /// Sets the share of the angular velocity that a step leaves ([`Self::angular_damping`]), from
+    /// 0 to 1.
+    #[must_use]
+    pub const fn with_angular_damping(self, angular_damping: f32) -> Self {
+        Self { angular_damping, ..self }
+    }
+
+    /// Sets the [gravity](Self::gravity), m/s², world frame.
+    #[must_use]
+    pub const fn with_gravity(self, gravity: [f32; 3]) -> Self {
+        Self { gravity, ..self }
+    }
+
+    /// Sets the number of passes of the [contact solver](Self::contact_iterations).
+    #[must_use]
+    pub const fn with_contact_iterations(self, contact_iterations: u32) -> Self {
+        Self { contact_iterations, ..self }
+    }
+
+    /// Sets the number of passes of the [friction solver](Self::friction_iterations).
+    #[must_use]
+    pub const fn with_friction_iterations(self, friction_iterations: u32) -> Self {
+        Self { friction_iterations, ..self }
+    }
+
+    /// Sets whether the step [integrates](Self::integrate) after the solver.
+    #[must_use]
+    pub const fn with_integrate(self, integrate: bool) -> Self {
+        Self { integrate, ..self }
+    }
+
+    /// Sets the [order](Self::order) of the collisions; `None` is the cheapest on the board at hand.
+    #[must_use]
+    pub fn with_order(self, order: impl Into<Option<Order>>) -> Self {
+        Self { order: order.into(), ..self }
+    }
+
+    /// Sets whether the driver [verifies the order](Self::verify_order) before it sends anything.
+    #[must_use]
+    pub const fn with_verify_order(self, verify_order: bool) -> Self {
+        Self { verify_order, ..self }
+    }
+
+    /// Sets the [time limit](Self::deadline) of the step on the accelerator; `None` derives it from
+    /// the work.
+    #[must_use]
+    pub fn with_deadline(self, deadline: impl Into<Option<Duration>>) -> Self {
+        Self { deadline: deadline.into(), ..self }
+    }
+
+    /// Sets the number of [repetitions](Self::retries) of a step that failed.
+    #[must_use]
+    pub const fn with_retries(self, retries: u32) -> Self {
+        Self { retries, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_setter_sets_its_own_field_and_no_other() {
+        let set = StepParameters::default()
+            .with_time_step(0.5)
+            .with_position_drift(0.25)
+            .with_position_coefficient(0.125)
+            .with_friction(0.75)
+            .with_angular_damping(0.5)
+            .with_gravity([1.0, 2.0, 3.0])
+            .with_contact_iterations(5)
+            .with_friction_iterations(6)
+            .with_integrate(false)
+            .with_order(Order::AsGiven)
+            .with_verify_order(true)
+            .with_deadline(Duration::from_secs(7))
+            .with_retries(8);
+        let fields = StepParameters {
+            time_step: 0.5,
+            position_drift: 0.25,
+            position_coefficient: 0.125,
+            friction: 0.75,
+            angular_damping: 0.5,
+            gravity: [1.0, 2.0, 3.0],
+            contact_iterations: 5,
+            friction_iterations: 6,
+            integrate: false,
+            order: Some(Order::AsGiven),
+            verify_order: true,
+            deadline: Some(Duration::from_secs(7)),
+            retries: 8,
+        };
+        assert_eq!(set, fields);
+        let unset = set.with_order(None).with_deadline(None);
+        assert_eq!(unset, StepParameters { order: None, deadline: None, ..fields });
+    }
+}

@@ -15,6 +15,7 @@ use super::pack::{Engines, PackedStep};
 use super::report::StepReport;
 use super::retry::with_retries;
 use super::stopwatch::Stopwatch;
+use super::unique_id::UniqueId;
 use crate::beat::pack::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
 use crate::board::cancellation::Cancellation;
@@ -48,6 +49,8 @@ pub struct Accelerator {
     pub(super) packed: PerBank<Option<PackedStep>>,
     /// The ordering of the step in each bank.
     pub(super) orderings: PerBank<Ordering>,
+    /// The step in flight that was detached.
+    pub(super) detached: Option<UniqueId>,
     /// Results of a step until all are checked. The memory is kept, so that a step allocates
     /// nothing.
     pub(super) staged: Vec<Record>,
@@ -105,6 +108,7 @@ impl Accelerator {
             bank: Bank::First,
             packed: PerBank::default(),
             orderings: PerBank::default(),
+            detached: None,
             staged: Vec::new(),
         }
     }
@@ -129,7 +133,7 @@ impl Accelerator {
     /// stay. [`Error::MustReopen`] after a fault that could not be cleared.
     pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
         standard(|| {
-            self.device.settle(&self.shapes)?;
+            self.settle()?;
             validate_shapes(shapes, &self.limits)?;
             self.device.control.load_shapes(shapes, self.limits.variant.inertia);
             self.shapes_loaded += 1;
@@ -187,7 +191,7 @@ impl Accelerator {
         parameters: &StepParameters,
     ) -> Result<InFlight<'_>, Error> {
         standard(move || {
-            self.device.settle(&self.shapes)?;
+            self.settle()?;
             let (mut watch, accesses) = (Stopwatch::start(), self.accesses());
             let into = (self.bank, Engines::Idle);
             let step = self.pack(into, bodies, collisions, parameters, &mut watch)?;

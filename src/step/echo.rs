@@ -56,7 +56,7 @@ pub(crate) struct EchoResult {
 impl Accelerator {
     /// Runs an echo. After an error the board was reset, if a reset was possible.
     pub(crate) fn echo(&mut self, echo: &Echo<'_>) -> Result<EchoResult, Error> {
-        self.device.settle(&self.shapes)?;
+        self.settle()?;
         let largest = self.device.largest;
         if echo.short_pieces {
             self.device.largest = largest_piece(LENGTH_WIDTH_MIN);

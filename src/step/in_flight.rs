@@ -22,6 +22,8 @@ use crate::validate::InputError;
 /// resets the board in bounded time and takes the buffers back. Nothing of that step remains, and
 /// the accelerator is ready for the next. Even a forgotten step ([`std::mem::forget`]) does no
 /// harm: the next call that needs the board resets it first.
+///
+/// It borrows the accelerator. [`detach`](Self::detach) ends the borrow and lets the step go on.
 #[derive(Debug)]
 #[must_use = "a step that is dropped in flight is stopped: call `wait` for its results"]
 pub struct InFlight<'a> {
@@ -30,7 +32,7 @@ pub struct InFlight<'a> {
 }
 
 /// The state of a step between its start and its end.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Flight {
     pub(super) step: PackedStep,
     /// `None` where no body moves and nothing is streamed.

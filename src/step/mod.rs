@@ -1,6 +1,7 @@
 //! One step, from the caller's bodies to the caller's bodies.
 
 mod accelerator;
+mod detached;
 mod echo;
 mod in_flight;
 mod locate;
@@ -15,10 +16,12 @@ mod retry;
 mod stopwatch;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
+mod unique_id;
 mod written;
 
 pub use accelerator::Accelerator;
 pub(crate) use accelerator::find;
+pub use detached::Detached;
 pub(crate) use echo::{ECHO_LIMIT, Echo, EchoResult, FillPattern, source_of};
 pub use in_flight::InFlight;
 pub use prepared::Prepared;

@@ -1,13 +1,12 @@
 //! Packs a step into a bank of buffers: check, order, reserve, pack.
 
-use std::sync::atomic::{AtomicU64, Ordering as Atomic};
-
 use super::accelerator::Accelerator;
 use super::ordering::{OrderSummary, Ordering, OrderingContext};
 use super::packing::{PackInput, SentSums};
 use super::report::HostTimes;
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
+use super::unique_id::UniqueId;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
@@ -16,22 +15,11 @@ use crate::order::Ordered;
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::validate::{InputError, Limits, Quick, Scene, preflight, validate};
 
-/// Identifies one packing among all packings of this process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct PackId(u64);
-
-impl PackId {
-    /// Makes an id that no other packing has.
-    pub(super) fn new() -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        Self(NEXT.fetch_add(1, Atomic::Relaxed))
-    }
-}
-
 /// A step whose records lie in a bank.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PackedStep {
-    pub(super) id: PackId,
+    /// Tells this packing from every other.
+    pub(super) id: UniqueId,
     pub(super) bank: Bank,
     pub(super) plan: Plan,
     /// The sums of the words sent; `None` if no body moves and nothing is streamed.
@@ -179,7 +167,7 @@ impl Accelerator {
             false => 0,
         };
         Ok(self.keep(PackedStep {
-            id: PackId::new(),
+            id: UniqueId::new(),
             bank,
             plan,
             sent,

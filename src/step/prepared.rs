@@ -9,10 +9,11 @@ use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
 use super::in_flight::{Flight, InFlight};
-use super::pack::{Engines, PackId, PackedStep};
+use super::pack::{Engines, PackedStep};
 use super::report::StepReport;
 use super::reserve::or_free;
 use super::stopwatch::Stopwatch;
+use super::unique_id::UniqueId;
 use crate::board::bank::Bank;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
@@ -35,7 +36,7 @@ use crate::validate::InputError;
 #[must_use = "a prepared step does not start by itself: call `start`"]
 pub struct Prepared {
     pub(super) bank: Bank,
-    pub(super) id: PackId,
+    pub(super) id: UniqueId,
 }
 
 impl InFlight<'_> {
@@ -204,7 +205,7 @@ impl Accelerator {
     }
 
     fn begin_prepared(&mut self, prepared: &Prepared, memory: Memory) -> Result<Flight, Error> {
-        self.device.settle(&self.shapes)?;
+        self.settle()?;
         let watch = Stopwatch::start();
         let accesses = self.accesses();
         let step = self.packed[prepared.bank].filter(|step| step.id == prepared.id);

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Times the phases of a step on the host, one lap each.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Stopwatch(Instant);
 
 impl Stopwatch {

@@ -5,11 +5,12 @@ use pgs_support::float_env::standard_around;
 use super::accelerator::Accelerator;
 use super::in_flight::InFlight;
 use super::ordering::{OrderSummary, in_order_of_writing};
-use super::pack::{Engines, PackId, PackedStep};
+use super::pack::{Engines, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
+use super::unique_id::UniqueId;
 use crate::beat::pack::target::Target;
 use crate::beat::pack::writer::Writer;
 use crate::board::bank::Bank;
@@ -81,7 +82,7 @@ impl Accelerator {
     ) -> Result<Prepared, Error> {
         standard_around(|caller| {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
-            self.device.settle(&self.shapes)?;
+            self.settle()?;
             let into = (self.bank, Engines::Idle);
             let step = self.pack_written(into, bodies, announced, parameters, narrow_phase)?;
             Ok(Prepared { bank: step.bank, id: step.id })
@@ -121,7 +122,7 @@ impl Accelerator {
         plan.collisions = written;
         host.pack = watch.lap();
         Ok(self.keep(PackedStep {
-            id: PackId::new(),
+            id: UniqueId::new(),
             bank,
             plan,
             sent: Some(sent),

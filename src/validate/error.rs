@@ -43,6 +43,13 @@ pub enum InputError {
     )]
     NotPrepared,
 
+    /// A detached step is no longer on the board.
+    #[error(
+        "the detached step is not in flight any more, because another call of the accelerator has \
+         stopped it, or it was started by another accelerator: submit it again"
+    )]
+    NotInFlight,
+
     /// The input changed during the call: packing refused it, and validation then accepted it.
     #[error(
         "bodies or collisions were wrong when they were packed, and right when they were looked at \

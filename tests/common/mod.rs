@@ -63,9 +63,7 @@ pub(crate) fn row(
 }
 
 pub(crate) fn ordered(order: Order) -> StepParameters {
-    let mut parameters = StepParameters::default();
-    parameters.order = Some(order);
-    parameters
+    StepParameters::default().with_order(order)
 }
 
 pub(crate) fn bits(bodies: &[Body]) -> Vec<u32> {

@@ -234,8 +234,8 @@ fn the_report_says_why_an_order_was_taken() {
 
 #[test]
 fn a_step_without_passes_or_collisions_is_sent_as_given() {
-    let mut parameters = StepParameters::default();
-    (parameters.contact_iterations, parameters.friction_iterations) = (0, 0);
+    let parameters =
+        StepParameters::default().with_contact_iterations(0).with_friction_iterations(0);
     let (report, _) = step(BoardConfig::default(), wall(), &parameters);
     assert_eq!(report.order, Order::AsGiven);
     let (report, _) =

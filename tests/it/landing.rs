@@ -86,8 +86,8 @@ fn the_unsupported_rim_of_a_pile_topples_and_nothing_gains_energy() {
     let mut scene = Scene::new(&options).expect("a small scene");
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let start = scene.bodies().to_vec();
-    let mut parameters = StepParameters::default();
-    (parameters.contact_iterations, parameters.friction_iterations) = (10, 10);
+    let parameters =
+        StepParameters::default().with_contact_iterations(10).with_friction_iterations(10);
 
     let mut energies = Vec::new();
     for _ in 0..600 {

@@ -10,6 +10,7 @@ mod common;
 #[path = "../vectors/mod.rs"]
 mod vectors;
 
+mod board_text;
 mod cheapest_order;
 mod check;
 mod extensions;

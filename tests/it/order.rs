@@ -25,9 +25,7 @@ fn sequential() -> BoardConfig {
 }
 
 fn verified(order: Order) -> StepParameters {
-    let mut parameters = ordered(order);
-    parameters.verify_order = true;
-    parameters
+    ordered(order).with_verify_order(true)
 }
 
 fn pile(text: &str, drop: f32) -> Scene {
@@ -255,8 +253,7 @@ fn the_full_step_gives_the_same_bits_and_keeps_its_energy() {
         let (_, mut accelerator) = open(config);
         accelerator.set_shapes(&start.shapes).expect("they fit");
         let mut bodies = start.bodies.clone();
-        let mut parameters = ordered(order);
-        parameters.integrate = false;
+        let parameters = ordered(order).with_integrate(false);
         let report = accelerator.step(&mut bodies, collisions, &parameters).expect("a step");
         let energy = kinetic_energy(&bodies, &start.shapes) / 1e3;
         println!(

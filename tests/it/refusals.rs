@@ -76,8 +76,7 @@ fn a_refusal_is_the_same_before_packing_and_while_packing() {
             // A board that keeps only live bodies needs the order in any case.
             profile.name != "windowed" || *order == Order::HazardFree
         }) {
-            let mut parameters = StepParameters::default();
-            parameters.order = Some(order);
+            let parameters = StepParameters::default().with_order(order);
             let mut warm = open(profile);
             let (mut expected, mut state) = (bodies.clone(), bodies.clone());
             warm.step(&mut state, &collisions, &parameters).expect("a step");
@@ -166,8 +165,7 @@ impl Collisions for WrongStructures {
 #[test]
 fn what_lies_nowhere_is_never_sent() {
     let (bodies, all) = scene();
-    let mut parameters = StepParameters::default();
-    parameters.order = Some(Order::AsGiven);
+    let parameters = StepParameters::default().with_order(Order::AsGiven);
     for profile in [&FLOAT, &HALF, &MIXED] {
         let mut expected = bodies.clone();
         open(profile).step(&mut expected, &all, &parameters).expect("a step");
@@ -199,8 +197,7 @@ fn what_is_wrong_at_one_look_alone_is_never_sent() {
         // Ordering reads each element once before packing does.
         let orders = [(Order::AsGiven, 1), (Order::HazardFree, 2)];
         for (order, at_read) in orders.into_iter().skip(usize::from(profile.flow != Flow::Passes)) {
-            let mut parameters = StepParameters::default();
-            parameters.order = Some(order);
+            let parameters = StepParameters::default().with_order(order);
             let mut board = open(profile);
             let mut expected = bodies.clone();
             board.step(&mut expected, &collisions, &parameters).expect("a step");

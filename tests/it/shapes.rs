@@ -22,8 +22,7 @@ fn shapes_of_any_inertia_are_solved_as_the_formulae_say() {
         accelerator.set_shapes(&shapes).expect("with world inertia");
         let (mut found, collisions) = scene(seed);
         // The reference takes the collisions in the given order.
-        let mut parameters = StepParameters::default();
-        parameters.order = Some(Order::AsGiven);
+        let parameters = StepParameters::default().with_order(Order::AsGiven);
         let mut expected = found.clone();
         let before = bits(&found);
         // The second step starts from other orientations.

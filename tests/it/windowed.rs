@@ -149,10 +149,10 @@ fn static_and_untouched_bodies_have_their_place_too() {
         for (count, contact, friction, integrate) in
             [(4, 4, 4, true), (3, 1, 0, true), (4, 0, 2, false), (2, 0, 0, true), (0, 4, 4, true)]
         {
-            let mut parameters = ordered(Order::HazardFree);
-            parameters.contact_iterations = contact;
-            parameters.friction_iterations = friction;
-            parameters.integrate = integrate;
+            let mut parameters = ordered(Order::HazardFree)
+                .with_contact_iterations(contact)
+                .with_friction_iterations(friction)
+                .with_integrate(integrate);
             let mut bodies = start.clone();
             let report = windowed
                 .step(&mut bodies, &all[..count], &parameters)

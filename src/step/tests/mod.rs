@@ -1,4 +1,5 @@
 //! Tests whole steps on the emulated board, which goes dead at the driver's first mistake.
+mod detached;
 mod fault;
 mod life;
 mod memory;

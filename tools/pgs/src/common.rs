@@ -3,9 +3,8 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use bitstream_model::interface::address_map::UIO_NODE;
 use clap::Args;
-use zynq_pgs::{ManagerChoice, MemoryChoice};
+use zynq_pgs::{BoardChoice, BoardTextError, ManagerChoice, MemoryChoice};
 
 use crate::environment::{BOARD, MANAGER, MEMORY, RTL, is_blank};
 use crate::options::memory::memory_choice;
@@ -115,16 +114,29 @@ pub(crate) enum BoardName {
     Socket(PathBuf),
 }
 
+/// The emulated board; its build is in options of its own.
+const EMULATED: &str = "emulated";
+
 /// Reads the name of a board.
 fn board_name(text: &str) -> Result<BoardName, String> {
-    match text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest))) {
-        ("auto", None) => Ok(BoardName::Auto),
-        ("uio", None) => Ok(BoardName::Uio(UIO_NODE.to_owned())),
-        ("uio", Some(node)) if !node.is_empty() => Ok(BoardName::Uio(node.to_owned())),
-        ("devmem", None) => Ok(BoardName::Devmem),
-        ("emulated", None) => Ok(BoardName::Emulated),
-        ("socket", Some(path)) if !path.is_empty() => Ok(BoardName::Socket(path.into())),
-        _ => Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned()),
+    let choice: BoardChoice = match text.parse() {
+        Ok(BoardChoice::Built(_)) if text != EMULATED => {
+            return Err(format!(
+                "give --board {EMULATED}, and its build as options (--profile and others)"
+            ));
+        }
+        Err(BoardTextError::Unknown { .. }) => {
+            return Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned());
+        }
+        choice => choice.map_err(|error| error.to_string())?,
+    };
+    match choice {
+        BoardChoice::Automatic => Ok(BoardName::Auto),
+        BoardChoice::Uio { node } => Ok(BoardName::Uio(node)),
+        BoardChoice::DevMem(_) => Ok(BoardName::Devmem),
+        BoardChoice::Built(_) => Ok(BoardName::Emulated),
+        BoardChoice::Served { socket } => Ok(BoardName::Socket(socket)),
+        _ => Err(format!("no command takes the board {text:?}")),
     }
 }
 
@@ -237,6 +249,30 @@ fn instead_of<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_board_is_named_as_in_the_library_and_its_build_in_options() {
+        let node = |name: &str| BoardName::Uio(name.to_owned());
+        for (text, board) in [
+            ("auto", BoardName::Auto),
+            ("uio", node("pgs")),
+            ("uio:other", node("other")),
+            ("devmem", BoardName::Devmem),
+            ("emulated", BoardName::Emulated),
+            ("socket:a:b", BoardName::Socket("a:b".into())),
+        ] {
+            assert_eq!(board_name(text), Ok(board));
+        }
+        for (text, part) in [
+            ("emulated:float", "--profile"),
+            ("emulated:fast", "begin with a profile"),
+            ("uio:", "expected auto, "),
+            ("abacus", "expected auto, "),
+        ] {
+            let error = board_name(text).expect_err(text);
+            assert!(error.contains(part), "{error}");
+        }
+    }
 
     #[test]
     fn a_manager_is_a_device_none_or_found_by_its_name() {

@@ -9,6 +9,7 @@ use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
+use zynq_pgs::emulation::Build;
 use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, DevMemWindows, Excess, Fault, MemoryChoice, OpenOptions,
@@ -22,8 +23,7 @@ use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure};
 use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
-use crate::options::build::BuildArgs;
-use crate::options::build_text::described;
+use crate::options::build::{board_option, described};
 use crate::options::planned::{Injected, PlannedArgs};
 use crate::output::facts::fact;
 
@@ -112,7 +112,7 @@ pub(crate) struct ChosenBoard {
 pub(crate) fn find(
     common: &CommonArgs,
     config: BoardConfig,
-    given: Option<&'static str>,
+    given: Option<String>,
 ) -> Result<ChosenBoard, Failure> {
     let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
     let (kind, reason) = choose(name, &System::default());
@@ -135,7 +135,7 @@ pub(crate) fn find(
         }
         let emulated = emulated_board(config, &common.accelerator)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
-    } else if let (BoardName::Socket(_), Some(option)) = (name, given) {
+    } else if let (BoardName::Socket(_), Some(option)) = (name, &given) {
         let error = format!("{option} builds an emulated board, but this one is already built");
         return Err(Failure::input(error).next(format!("give {option} to its `pgs serve`")));
     } else if let BoardName::Socket(socket) = name {
@@ -185,9 +185,9 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 }
 
 /// Opens a board.
-pub(crate) fn open(common: &CommonArgs, build: &BuildArgs) -> Result<OpenBoard, Failure> {
+pub(crate) fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard, Failure> {
     let ChosenBoard { options, observer, reason, .. } =
-        find(common, build.config(), build.board_option())?;
+        find(common, build.config(), board_option(build))?;
     let accelerator = Accelerator::open(options)
         .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
     Ok(OpenBoard { accelerator, observer, injected: None, reason })

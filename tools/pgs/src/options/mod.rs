@@ -2,7 +2,6 @@
 
 pub(crate) mod bandwidth;
 pub(crate) mod build;
-pub(crate) mod build_text;
 pub(crate) mod memory;
 pub(crate) mod ordering;
 pub(crate) mod planned;

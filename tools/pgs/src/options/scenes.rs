@@ -4,10 +4,10 @@ use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
 use zynq_pgs::Capabilities;
+use zynq_pgs::emulation::Build;
 
 use crate::failure::Failure;
 use crate::numbers::grouped;
-use crate::options::build::BuildArgs;
 
 /// Default drop, m: the pile lands within half a second.
 const DROP: f32 = 1.0;
@@ -64,7 +64,7 @@ fn drop_height(text: &str) -> Result<f32, String> {
 
 impl SceneArgs {
     /// Builds the scene. Detection uses as many threads as the emulated board may.
-    pub(crate) fn build(&self, board: &BuildArgs) -> Result<Scene, Failure> {
+    pub(crate) fn build(&self, board: &Build) -> Result<Scene, Failure> {
         let Self { grid, drop, .. } = *self;
         let built = match self.scene {
             SceneName::Cubes if self.seed.is_some() => {

@@ -10,7 +10,7 @@ use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 use crate::board::{self, ChosenBoard};
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
-use crate::options::build::BuildArgs;
+use crate::options::build::{BuildArgs, board_option};
 use crate::output::SCHEMA;
 
 const EXAMPLES: &str = "\
@@ -83,12 +83,12 @@ impl QuirkName {
 impl CheckArgs {
     fn config(&self) -> BoardConfig {
         let quirks = self.quirk.map(QuirkName::quirks).unwrap_or_default();
-        BoardConfig { quirks, ..self.build.config() }
+        BoardConfig { quirks, ..self.build.build().config() }
     }
 
     /// The first given option that only an emulated board has.
-    fn board_option(&self) -> Option<&'static str> {
-        self.quirk.map(|_| "--quirk").or(self.build.board_option())
+    fn board_option(&self) -> Option<String> {
+        self.quirk.map(|_| "--quirk".to_owned()).or_else(|| board_option(&self.build.build()))
     }
 }
 

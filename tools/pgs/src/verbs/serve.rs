@@ -17,8 +17,7 @@ use crate::common::{BoardName, CommonArgs};
 use crate::failure::{Cause, Failure, Verdict};
 use crate::interrupt;
 use crate::numbers::grouped;
-use crate::options::build::BuildArgs;
-use crate::options::build_text::described;
+use crate::options::build::{BuildArgs, described};
 use crate::options::planned::PlannedArgs;
 use crate::output::SCHEMA;
 
@@ -84,7 +83,7 @@ pub(crate) fn run(
         }
     };
     // A driver's mistake is reported, and the board goes on to serve the next driver.
-    let mut config = BoardConfig { strict: false, ..args.build.config() };
+    let mut config = BoardConfig { strict: false, ..args.build.build().config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let wanted = args.memory_mib.map(|mib| mib << 20);

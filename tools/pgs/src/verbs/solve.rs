@@ -146,7 +146,7 @@ pub(crate) fn run(
         true => expected(&folder, &parameters)?,
         false => Vec::new(),
     };
-    let mut opened = board::open(common, &args.build)?;
+    let mut opened = board::open(common, &args.build.build())?;
     folder
         .check_shapes(opened.accelerator.capabilities().shape_capacity)
         .map_err(Failure::input)?;

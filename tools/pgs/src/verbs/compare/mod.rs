@@ -36,10 +36,11 @@ Examples:
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked,
 unchecked, keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
-length-width=BITS and address-width=BITS. The order of a board's collisions is one of auto,
-as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest,
-colours. Without an order, a board that waits on hazards takes the collisions as given, so that two
-such boards solve them in the same order. Each board detects its own collisions.
+length-width=BITS, address-width=BITS, threads=N and lanes=on|off. The order of a board's collisions
+is one of auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest,
+body-by-body-newest, colours. Without an order, a board that waits on hazards takes the collisions
+as given, so that two such boards solve them in the same order. Each board detects its own
+collisions.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1) and leave out components where A is 0. A velocity is within 1 % if it

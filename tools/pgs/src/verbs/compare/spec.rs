@@ -3,13 +3,14 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::options::build::BuildArgs;
+use zynq_pgs::emulation::{Build, BuildError};
+
 use crate::options::ordering::{OrderName, OrderingArgs};
 
 /// The specification of a side: the build of its board, and the order of its collisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SideSpec {
-    pub(super) build: BuildArgs,
+    pub(super) build: Build,
     pub(super) ordering: OrderingArgs,
 }
 
@@ -27,7 +28,7 @@ impl FromStr for SideSpec {
                 _ => rest.push(word),
             }
         }
-        let build = rest.join(",").parse().map_err(|error| {
+        let build = rest.join(",").parse().map_err(|error: BuildError| {
             format!("{error}; orders of the collisions are {}", OrderName::all())
         })?;
         Ok(Self { build, ordering: OrderingArgs { order, verify: false } })

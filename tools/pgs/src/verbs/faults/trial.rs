@@ -178,8 +178,7 @@ impl Bench {
 
     fn of(config: BoardConfig, deadline: Duration) -> Result<Self, Failure> {
         let (small, large) = (State::settled(3, config)?, State::settled(4, config)?);
-        let mut parameters = StepParameters::default();
-        parameters.deadline = Some(deadline);
+        let parameters = StepParameters::default().with_deadline(deadline);
         let accelerator = AcceleratorChoice::Model;
         let (board, mut driver) = open(config, &accelerator, &small.shapes)?;
         let mut bodies = small.bodies.clone();

@@ -26,7 +26,7 @@ use serde_json::json;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
-use crate::options::bandwidth::bandwidth;
+use crate::options::build::number;
 use report::Table;
 use scene::Scene;
 
@@ -64,7 +64,7 @@ pub(crate) struct ModelArgs {
     world_inertia: bool,
     /// Memory bandwidth of the table of times in GB/s, or "unlimited" [default: unlimited, 17.07,
     /// 16 and 12.8 in turn]
-    #[arg(long, value_name = "GBPS", value_parser = bandwidth)]
+    #[arg(long, value_name = "GBPS", value_parser = number("bandwidth", |build| build.bandwidth))]
     bandwidth: Option<Bandwidth>,
     /// Tables to show [default: all]
     #[arg(long, value_name = "SECTION", value_delimiter = ',')]

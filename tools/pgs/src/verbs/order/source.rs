@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use scene::{Scene, SceneOptions, Spheres};
+use zynq_pgs::emulation::Build;
 use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
@@ -11,7 +12,6 @@ use super::OrderArgs;
 use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
-use crate::options::build::BuildArgs;
 use crate::step_input;
 use step_folder::folder::Folder;
 use step_folder::npy::{self, Dimensions};
@@ -80,7 +80,7 @@ impl Source {
         let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         if args.steps > 0 {
-            let mut opened = board::open(common, &BuildArgs::default())?;
+            let mut opened = board::open(common, &Build::default())?;
             opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
             for _ in 0..args.steps {
                 scene.detect();

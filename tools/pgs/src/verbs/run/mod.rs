@@ -91,9 +91,9 @@ pub(crate) struct RunArgs {
 
 impl RunArgs {
     fn parameters(&self) -> StepParameters {
-        let mut parameters = StepParameters::default();
-        parameters.contact_iterations = ITERATIONS;
-        parameters.friction_iterations = ITERATIONS;
+        let parameters = StepParameters::default()
+            .with_contact_iterations(ITERATIONS)
+            .with_friction_iterations(ITERATIONS);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
@@ -124,9 +124,9 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut opened = board::open(common, &args.build)?;
+    let mut opened = board::open(common, &args.build.build())?;
     args.scene.check_size(opened.accelerator.capabilities())?;
-    let mut scene = args.scene.build(&args.build)?;
+    let mut scene = args.scene.build(&args.build.build())?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());

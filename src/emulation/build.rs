@@ -1,0 +1,147 @@
+//! The options of a build, and the configuration that they make.
+
+use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::profile::{FLOAT, Inertia, Profile};
+
+/// The build of an emulated board, option by option; `None` is the default of the board or of its
+/// profile.
+///
+/// [`parse`](str::parse) reads a text, and [`Display`](std::fmt::Display) writes it: the [module's
+/// page](crate::emulation) has its options.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Build {
+    /// Design of the accelerator.
+    pub profile: Option<&'static Profile>,
+    /// Numbers on the streams that have its width in the profile.
+    pub format: Option<StreamFormat>,
+    /// Precision of the pipeline's operators; storage keeps the width of the profile.
+    pub arithmetic: Option<Precision>,
+    /// Form in which the board gets the inertia of its bodies.
+    pub inertia: Option<Inertia>,
+    /// Behaviour on read-after-write hazards.
+    pub hazards: Option<Hazards>,
+    /// Hazard window, issue slots.
+    pub window: Option<u32>,
+    /// Arithmetic on subnormal numbers.
+    pub subnormals: Option<Subnormals>,
+    /// Memory bandwidth.
+    pub bandwidth: Option<Bandwidth>,
+    /// Width of the DMA length registers, bits.
+    pub length_width: Option<u32>,
+    /// Width of DMA addresses, bits.
+    pub address_width: Option<u32>,
+    /// Threads of this machine for the board's arithmetic; no result depends on their number.
+    /// [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) has the driver's own.
+    pub threads: Option<usize>,
+    /// Whether the board computes in SIMD lanes; no result depends on it.
+    pub lanes: Option<bool>,
+}
+
+impl Build {
+    /// The configuration of the described board. [`EmulatedBoard::new`](bitstream_model::EmulatedBoard::new)
+    /// refuses options that contradict each other.
+    #[must_use]
+    pub fn config(&self) -> BoardConfig {
+        let default = BoardConfig::default();
+        let profile = self.profile.unwrap_or(&FLOAT);
+        let numbers = self.numbers(&profile.numbers);
+        BoardConfig {
+            profile,
+            numbers: (numbers != profile.numbers).then_some(numbers),
+            inertia: self.inertia.unwrap_or(default.inertia),
+            hazards: self.hazards.unwrap_or(default.hazards),
+            window_slots: self.window,
+            subnormals: self.subnormals.unwrap_or(default.subnormals),
+            bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
+            length_width: self.length_width.unwrap_or(default.length_width),
+            address_width: self.address_width.unwrap_or(default.address_width),
+            threads: self.threads.unwrap_or(default.threads),
+            lanes: self.lanes.unwrap_or(default.lanes),
+            ..default
+        }
+    }
+
+    /// The profile's number formats, with the formats of the options in their place.
+    fn numbers(&self, own: &Numbers) -> Numbers {
+        let mut numbers = *own;
+        if let Some(format) = self.format {
+            let narrow = |stream: StreamFormat| stream.bits() == format.bits();
+            // Where no stream has 16 bits, the board's error tells which widths do not fit.
+            let none = ![own.collisions, own.bodies, own.poses].into_iter().any(narrow);
+            for stream in [&mut numbers.collisions, &mut numbers.bodies, &mut numbers.poses] {
+                if none || narrow(*stream) {
+                    *stream = format;
+                }
+            }
+        }
+        if let Some(arithmetic) = self.arithmetic {
+            (numbers.rows, numbers.updates) = (arithmetic, arithmetic);
+        }
+        numbers
+    }
+
+    /// The options that turn the default board of a profile into this one. They hold no mistake in
+    /// the build ([`BoardConfig::quirks`]), no delay, and of the number formats only what the
+    /// options can say.
+    #[must_use]
+    pub fn of(config: &BoardConfig) -> Self {
+        fn unlike<T: PartialEq + Copy>(value: T, default: T) -> Option<T> {
+            (value != default).then_some(value)
+        }
+        let default = BoardConfig::default();
+        let (own, numbers) = (config.profile.numbers, config.variant().numbers);
+        // The format f32 has no name in a build.
+        let format = unlike(numbers.collisions, own.collisions)
+            .or_else(|| unlike(numbers.bodies, own.bodies))
+            .or_else(|| unlike(numbers.poses, own.poses))
+            .filter(|format| *format != StreamFormat::F32);
+        let arithmetic =
+            unlike(numbers.updates, own.updates).or_else(|| unlike(numbers.rows, own.rows));
+        Self {
+            profile: Some(config.profile),
+            format,
+            arithmetic,
+            inertia: unlike(config.inertia, default.inertia),
+            hazards: unlike(config.hazards, default.hazards),
+            window: config.window_slots,
+            subnormals: unlike(config.subnormals, default.subnormals),
+            bandwidth: unlike(config.bandwidth, default.bandwidth),
+            length_width: unlike(config.length_width, default.length_width),
+            address_width: unlike(config.address_width, default.address_width),
+            threads: unlike(config.threads, default.threads),
+            lanes: unlike(config.lanes, default.lanes),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_option_is_the_default_board() {
+        assert_eq!(Build::default().config(), BoardConfig::default());
+    }
+
+    #[test]
+    fn a_format_goes_where_the_streams_have_its_width() {
+        let numbers = |profile, format, arithmetic| {
+            let profile = Profile::by_name(profile);
+            let config = Build { profile, format, arithmetic, ..Build::default() }.config();
+            (config.numbers.is_some(), config.variant().numbers)
+        };
+        let (changed, half) = numbers("half", Some(StreamFormat::Binary16), None);
+        assert_eq!((changed, half), (false, Numbers::BINARY16));
+        let thesis = StreamFormat::Thesis16;
+        let (_, half) = numbers("half", Some(thesis), Some(Precision::F32));
+        assert_eq!((half.collisions, half.bodies), (thesis, thesis));
+        assert_eq!((half.rows, half.updates), (Precision::F32, Precision::F32));
+        assert_eq!(half.velocities, Precision::Binary16, "storage stays");
+        let (_, mixed) = numbers("mixed", Some(thesis), None);
+        assert_eq!((mixed.collisions, mixed.bodies), (thesis, StreamFormat::F32));
+        // The board refuses it, and names the reason.
+        let (_, float) = numbers("float", Some(thesis), None);
+        assert_eq!((float.collisions, float.bodies), (thesis, thesis));
+    }
+}

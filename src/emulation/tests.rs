@@ -1,0 +1,166 @@
+//! Texts of builds: reading, writing, refusing.
+
+use std::fmt;
+
+use bitstream_model::{Bandwidth, EmulatedBoard, Hazards, Subnormals};
+use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::profile::{Inertia, PROFILES, Profile};
+use proptest::prelude::*;
+
+use super::{Build, BuildError};
+
+fn build(text: &str) -> Result<Build, BuildError> {
+    text.parse()
+}
+
+#[test]
+fn a_build_is_written_as_it_is_read() {
+    for text in [
+        "naive",
+        "float",
+        "half",
+        "mixed",
+        "float,interlocked",
+        "half,thesis16,f32,unchecked",
+        "half,f32,unchecked,world",
+        "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
+        "float,bandwidth=unlimited,length-width=14,address-width=32",
+        "mixed,bandwidth=17.07,threads=1,lanes=off",
+    ] {
+        let build = build(text).expect(text);
+        assert_eq!(build.to_string(), text);
+        EmulatedBoard::new(build.config()).expect(text);
+    }
+}
+
+#[test]
+fn words_may_stand_in_any_order() {
+    let expected = build("half,thesis16,f32,unchecked,flush");
+    assert_eq!(build("half,flush,unchecked,arithmetic=f32,format=thesis16"), expected);
+}
+
+#[test]
+fn a_word_means_what_the_option_means() {
+    let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+                length-width=14,address-width=32,threads=3,lanes=off";
+    let expected = Build {
+        profile: Profile::by_name("half"),
+        format: Some(StreamFormat::Binary16),
+        arithmetic: Some(Precision::F32),
+        inertia: Some(Inertia::World),
+        hazards: Some(Hazards::Unchecked),
+        window: Some(9),
+        subnormals: Some(Subnormals::Flush),
+        bandwidth: Some(Bandwidth::Unlimited),
+        length_width: Some(14),
+        address_width: Some(32),
+        threads: Some(3),
+        lanes: Some(false),
+    };
+    assert_eq!(build(text), Ok(expected));
+    for key in Build::keys() {
+        let value = expected.value(key).expect(key);
+        let mut alone = Build::default();
+        alone.set(key, &value).expect(key);
+        assert_eq!(alone.value(key), Some(value));
+        assert_eq!(Build::keys().filter(|key| alone.value(key).is_some()).count(), 1);
+    }
+}
+
+#[test]
+fn a_text_that_is_no_build_is_refused_with_the_known_words() {
+    for text in ["", ",float", "Float", "unchecked", "float half", "profile=half"] {
+        let error = build(text).expect_err(text);
+        assert!(matches!(error, BuildError::Profile { .. }), "{error}");
+        assert!(
+            error.to_string().contains("(naive, float, half, mixed, windowed, windowed16)"),
+            "{error}"
+        );
+    }
+    for text in
+        ["float,", "float,double", "float,window", "float,colour=red", "float, world", "float,on"]
+    {
+        let error = build(text).expect_err(text);
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "{:?} is no option of a build: give one of binary16, thesis16, f32, \
+                 arithmetic=f32|binary16, interlocked, unchecked, window=SLOTS, keep, flush, \
+                 isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
+                 address-width=BITS, threads=N, lanes=on|off",
+                text.split_once(',').expect("two words").1
+            )
+        );
+    }
+    for (text, key) in [("float,keep,flush", "subnormals"), ("float,half", "profile")] {
+        let error = build(text).expect_err("twice");
+        assert_eq!(error.to_string(), format!("{key} is given twice: give it once"));
+    }
+    for (text, expected) in [
+        ("float,window=0", "window=0: expected a whole number from 1 to 4294967295"),
+        ("float,window=", "window=: expected a whole number from 1 to 4294967295"),
+        ("float,threads=0", "threads=0: expected a whole number from 1 to 31"),
+        ("half,arithmetic=f64", "arithmetic=f64: expected f32 or binary16"),
+        ("half,format=f32", "format=f32: expected binary16 or thesis16"),
+    ] {
+        assert_eq!(build(text).expect_err(text).to_string(), expected);
+    }
+    let unknown = Build::default().set("colour", "red").expect_err("no such option");
+    assert!(matches!(unknown, BuildError::Word { .. }), "{unknown}");
+    assert!(Build::names("colour").is_empty() && Build::default().value("colour").is_none());
+}
+
+fn any_of<T: Copy + fmt::Debug + 'static>(values: [T; 2]) -> impl Strategy<Value = Option<T>> {
+    prop::option::of(prop::sample::select(values.to_vec()))
+}
+
+fn any_build() -> impl Strategy<Value = Build> {
+    let rate = prop_oneof![
+        Just(Bandwidth::Unlimited),
+        (100_000_000_u64..=1_000_000_000_000).prop_map(Bandwidth::BytesPerSecond),
+    ];
+    (
+        prop::sample::select(PROFILES.to_vec()),
+        (any_of([StreamFormat::Binary16, StreamFormat::Thesis16]), any_of(Precision::ALL)),
+        (any_of([Inertia::Isotropic, Inertia::World]), any_of([true, false])),
+        any_of([Hazards::Interlocked, Hazards::Unchecked]),
+        any_of([Subnormals::Keep, Subnormals::Flush]),
+        (prop::option::of(1..=u32::MAX), prop::option::of(rate), prop::option::of(1_usize..=31)),
+        (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64)),
+    )
+        .prop_map(|(profile, formats, choices, hazards, subnormals, numbers, widths)| Build {
+            profile: Some(profile),
+            format: formats.0,
+            arithmetic: formats.1,
+            inertia: choices.0,
+            lanes: choices.1,
+            hazards,
+            subnormals,
+            window: numbers.0,
+            bandwidth: numbers.1,
+            threads: numbers.2,
+            length_width: widths.0,
+            address_width: widths.1,
+        })
+}
+
+proptest! {
+    #[test]
+    fn every_build_survives_its_text(built in any_build()) {
+        prop_assert_eq!(build(&built.to_string()), Ok(built));
+    }
+
+    #[test]
+    fn a_board_is_what_its_text_says(built in any_build()) {
+        let config = built.config();
+        let again = Build::of(&config);
+        prop_assert_eq!(again.config(), config);
+        // A text holds no option that equals its default.
+        prop_assert!(again.to_string().len() <= built.to_string().len());
+    }
+
+    #[test]
+    fn no_text_makes_the_parser_panic(text in "(half|float|),?[a-z0-9=,.]{0,30}") {
+        let _ = build(&text);
+    }
+}
