@@ -22,6 +22,7 @@ module core (
   input  wire [7:0]   friction_iterations,
   input  wire         integrate,
   input  wire         kinematic,
+  input  wire         pair_friction,
   input  wire [31:0]  time_step,
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
@@ -188,6 +189,7 @@ module core (
   wire [19:0]        find_error_collision;
   finder #(.BODIES(BODIES), .BODY(BODY), .COLLISION(COLLISION)) find (
     .clk(clk), .clear(clear), .run(finding), .phase(phase), .bodies(bodies), .collisions(collisions),
+    .pair_friction(pair_friction),
     .count_comes(collision_begins[0]), .count_word(s_tdata[127:96]),
     .body_a_comes(collision_begins[1]), .body_a_word(s_tdata[255:224]),
     .body_b_comes(collision_begins[2]), .body_b_word(s_tdata[383:352]),
@@ -230,6 +232,9 @@ module core (
   reg             early_moves_a, early_moves_b, moves_a, moves_b;
   reg  [63:0]     early_mass_a, early_mass_b, mass_a, mass_b;
   reg  [2:0]      early_points, points;
+  reg  [31:0]     friction_of;         // coefficient of the collision
+  wire [31:0]     own_friction;
+  half_to_float widened (.half(early[126:112]), .number(own_friction));
   always @(posedge clk) begin
     second <= issues & ~clear;
     if (slot_begins) begin
@@ -240,6 +245,7 @@ module core (
     if (phase) begin
       valid <= second & ~clear;
       rows  <= {head[2], head[1], head[0], early};
+      friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
       {mass_a, mass_b, points} <= {early_mass_a, early_mass_b, early_points};
@@ -369,7 +375,7 @@ module core (
     .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
     .point0(rows[479:384]), .point1(rows[607:512]), .point2(rows[735:640]), .point3(rows[863:768]),
     .used1(used[1]), .used2(used[2]), .used3(used[3]),
-    .total(impulse0), .friction(friction_coefficient), .spin_damping(spin_damping),
+    .total(impulse0), .friction(friction_of), .spin_damping(spin_damping),
     .impulse0(impulse1), .impulse1(impulse2),
     .out_impulse0(friction_impulses[31:0]), .out_impulse1(friction_impulses[63:32]),
     .out_linear_a(friction_velocity_a[95:0]), .out_angular_a(friction_velocity_a[191:96]),

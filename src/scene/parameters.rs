@@ -234,11 +234,24 @@ impl StepParameters {
         Self { friction, ..self }
     }
 
+    /// Sets whether each collision has a friction of its own ([`Self::pair_friction`]).
+    #[must_use]
+    pub const fn with_pair_friction(self, pair_friction: bool) -> Self {
+        Self { pair_friction, ..self }
+    }
+
     /// Sets the share of the angular velocity that a step leaves ([`Self::angular_damping`]), from
     /// 0 to 1.
     #[must_use]
     pub const fn with_angular_damping(self, angular_damping: f32) -> Self {
         Self { angular_damping, ..self }
+    }
+
+    /// Sets the share of the spin that a friction pass takes away ([`Self::spin_damping`]), from 0
+    /// to 1.
+    #[must_use]
+    pub const fn with_spin_damping(self, spin_damping: f32) -> Self {
+        Self { spin_damping, ..self }
     }
 
     /// Sets the [gravity](Self::gravity), m/s², world frame.
@@ -263,6 +276,12 @@ impl StepParameters {
     #[must_use]
     pub const fn with_integrate(self, integrate: bool) -> Self {
         Self { integrate, ..self }
+    }
+
+    /// Sets whether static bodies [may move](Self::kinematic).
+    #[must_use]
+    pub const fn with_kinematic(self, kinematic: bool) -> Self {
+        Self { kinematic, ..self }
     }
 
     /// Sets the [order](Self::order) of the collisions; `None` is the cheapest on the board at hand.
@@ -302,6 +321,9 @@ mod tests {
             .with_position_drift(0.25)
             .with_position_coefficient(0.125)
             .with_friction(0.75)
+            .with_pair_friction(true)
+            .with_spin_damping(0.0)
+            .with_kinematic(true)
             .with_angular_damping(0.5)
             .with_gravity([1.0, 2.0, 3.0])
             .with_contact_iterations(5)
@@ -316,7 +338,10 @@ mod tests {
             position_drift: 0.25,
             position_coefficient: 0.125,
             friction: 0.75,
+            pair_friction: true,
             angular_damping: 0.5,
+            spin_damping: 0.0,
+            kinematic: true,
             gravity: [1.0, 2.0, 3.0],
             contact_iterations: 5,
             friction_iterations: 6,

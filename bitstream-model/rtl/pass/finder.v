@@ -18,6 +18,7 @@ module finder #(
   input  wire                 phase,         // 1 in every second cycle
   input  wire [19:0]          bodies,
   input  wire [19:0]          collisions,
+  input  wire                 pair_friction, // a friction is above the contact count
 
   // The first beats of a collision, as they enter the accelerator.
   input  wire                 count_comes,
@@ -69,7 +70,8 @@ module finder #(
   wire [5:0]    counts_left, a_left, b_left, found_left;
   wire          counts_below, a_below, b_below;
   wire          unused = &{1'b0, counts_left, a_left, b_left, found_left, counts_below, a_below, b_below};
-  wire [2:0]    count_in = |count_word[31:3] ? 3'd7 : count_word[2:0];
+  wire          count_large = |count_word[15:3] | count_word[31] | (|count_word[30:16] & ~pair_friction);
+  wire [2:0]    count_in = count_large ? 3'd7 : count_word[2:0];
 
   fifo #(.WIDTH(3), .ADDRESS(5)) counts (
     .clk(clk), .clear(clear), .push(count_comes), .in(count_in),

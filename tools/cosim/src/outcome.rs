@@ -160,7 +160,8 @@ pub(crate) fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), Ext
 /// The switches of a step.
 fn flags_of(arguments: &Arguments) -> u32 {
     let word = flags::INTEGRATE.put(0, arguments.integrate.into());
-    flags::KINEMATIC.put(word, arguments.kinematic.into())
+    let word = flags::KINEMATIC.put(word, arguments.kinematic.into());
+    flags::PAIR_FRICTION.put(word, arguments.pair_friction.into())
 }
 
 pub(crate) fn set_up(

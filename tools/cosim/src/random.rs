@@ -2,6 +2,7 @@
 
 use pgs_interface::profile::solver::SPIN_DAMPING;
 use pgs_interface::record::CONTACT_POINTS;
+use pgs_interface::record::collision::FRICTION_SHIFT;
 use rtlgen::verify::random::SplitMix64;
 
 use crate::packets::{Fault, FaultAt, STREAMS};
@@ -169,6 +170,7 @@ pub fn case(seed: u64) -> Case {
         friction_iterations: iterations(&mut draw),
         integrate: !draw.one_in(5),
         kinematic: false,
+        pair_friction: false,
         numbers: [
             (1.0_f32 / 60.0).to_bits(),
             draw.number(0.02).abs().to_bits(),
@@ -205,12 +207,21 @@ pub fn case(seed: u64) -> Case {
         *spin_damping = share.to_bits();
     }
     case.scene.arguments.kinematic = draw.one_in(2);
+    if draw.one_in(2) {
+        case.scene.arguments.pair_friction = true;
+        for collision in &mut case.scene.collisions {
+            // A binary16 number below 2, often a subnormal one.
+            let friction = draw.below(1 << 14) >> if draw.one_in(4) { 5 } else { 0 };
+            collision.count |= friction << FRICTION_SHIFT;
+        }
+    }
     case
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pgs_interface::record::collision::FRICTION_BITS;
 
     #[test]
     fn a_seed_gives_the_same_case_and_another_one_another() {
@@ -225,7 +236,7 @@ mod tests {
         assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
         assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
         for count in 0..=5 {
-            let has = |collision: &Collision| collision.count.min(5) == count;
+            let has = |collision: &Collision| (collision.count & !FRICTION_BITS).min(5) == count;
             assert!(cases.iter().any(|case| case.scene.collisions.iter().any(has)), "{count}");
         }
     }

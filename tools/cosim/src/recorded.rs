@@ -49,6 +49,7 @@ pub fn scene(folder: &Folder) -> Scene {
             friction_iterations: parameters.friction_iterations,
             integrate: parameters.integrate,
             kinematic: parameters.kinematic,
+            pair_friction: parameters.pair_friction,
             numbers: [
                 parameters.time_step,
                 parameters.position_drift,

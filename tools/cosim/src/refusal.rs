@@ -55,6 +55,7 @@ fn scene() -> Scene {
         friction_iterations: 2,
         integrate: true,
         kinematic: false,
+        pair_friction: false,
         numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
         gravity: [0, (-9.8_f32).to_bits(), 0],
     };

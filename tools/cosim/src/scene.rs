@@ -52,6 +52,8 @@ pub struct Arguments {
     pub integrate: bool,
     /// Whether bodies without a mass move.
     pub kinematic: bool,
+    /// Whether a friction is above each contact count.
+    pub pair_friction: bool,
     /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
     pub numbers: [u32; 6],
     /// Gravity.

@@ -40,8 +40,7 @@ impl Default for Parameters {
 }
 
 /// The extensions of the interface that the Verilog has.
-pub const EXTENSIONS: Extensions =
-    Extensions { spin_damping: true, kinematic: true, ..Extensions::NONE };
+pub const EXTENSIONS: Extensions = Extensions::ALL;
 
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

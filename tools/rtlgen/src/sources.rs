@@ -32,6 +32,7 @@ pub const AROUND: &[Source<'_>] = sources! {
         "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";
     "step/": "constants", "loader", "body_shapes", "integrator", "step_sequence";
+    "operators/": "half_to_float";
     "pass/": "finder", "issue", "impulses", "impulse_sum";
     "": "core", "control_block", "pgs_top";
 };

@@ -22,7 +22,7 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 
 /// The graph of a friction pass.
 ///
-/// `per_count` is 1 / count, `total` the normal impulse that the last contact pass stored, and
+/// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal impulse that the last contact pass stored, and
 /// `one_static` tells whether a body of the collision is static.
 #[must_use]
 pub fn friction() -> Graph {
@@ -45,7 +45,7 @@ pub fn friction() -> Graph {
         g.scale(sum, per_count)
     });
     let total = g.input(Source::Impulse, "total");
-    let friction = g.input(Source::Argument, "friction");
+    let friction = g.input(Source::Record, "friction");
     let limit = g.within("limit", |g| g.multiply(friction, total));
     let axis = normal.negated();
     let tangents = g.within("tangents", |g| tangents(g, axis));
