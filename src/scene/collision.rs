@@ -22,7 +22,12 @@ pub struct Contact {
     pub distance: f32,
 }
 
-/// Two bodies in contact at one to four points.
+/// Two bodies in contact at one to four points, or a place without contacts.
+///
+/// A collision of count 0 is empty: it affects no body, whatever the order and the bitstream, and
+/// keeps its index, so that the collisions behind it keep theirs. Nothing of it is looked at but the
+/// count: its bodies need not exist or differ, its numbers need not be finite. It counts like any
+/// other against the number of collisions that a bitstream takes.
 ///
 /// Either body may be A, as long as the normal points from B to A and the contact points lie on B.
 /// One of them may be static. All points share the normal: a manifold with several normals, such as
@@ -38,7 +43,7 @@ pub struct Collision {
     pub body_b: u32,
     /// Unit normal, world frame, pointing from B to A: the direction in which A is pushed.
     pub normal: [f32; 3],
-    /// Number of contact points, 1 to [`CONTACT_POINTS`].
+    /// Number of contact points, 0 to [`CONTACT_POINTS`].
     pub count: u32,
     /// The contact points; the elements from `count` on are ignored.
     pub contacts: [Contact; CONTACT_POINTS],
@@ -141,7 +146,7 @@ pub struct CollisionArrays<'a> {
     pub bodies: &'a [[u32; 2]],
     /// Unit normals from B to A.
     pub normals: &'a [[f32; 3]],
-    /// Numbers of contact points.
+    /// Numbers of contact points; 0 for an empty collision.
     pub counts: &'a [u32],
     /// Contact points: x, y, z on B's surface, and signed distance, m.
     pub contacts: &'a [[[f32; 4]; CONTACT_POINTS]],

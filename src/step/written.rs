@@ -118,7 +118,7 @@ impl Accelerator {
         let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
         let (sent, written) =
             device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
-        plan.collisions = written;
+        plan.collisions = written.collisions;
         host.pack = watch.lap();
         Ok(self.keep(PackedStep {
             id: PackId::new(),
@@ -127,8 +127,8 @@ impl Accelerator {
             sent: Some(sent),
             parameters: *parameters,
             bodies: bodies.len(),
-            collisions: written,
-            empty: 0,
+            collisions: written.collisions - written.paddings,
+            empty: written.paddings,
             order_summary: OrderSummary::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,

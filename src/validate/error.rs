@@ -171,10 +171,10 @@ pub enum InputError {
         body_b: u32,
     },
 
-    /// The number of contact points is not within 1 to [`CONTACT_POINTS`].
+    /// The number of contact points is above [`CONTACT_POINTS`].
     #[error(
-        "collision {collision}: its count is {found}, expected 1 to {CONTACT_POINTS} contact \
-         points: remove the collision if there are none, reduce them if there are more"
+        "collision {collision}: its count is {found}, expected at most {CONTACT_POINTS} contact \
+         points: reduce them"
     )]
     ContactCount {
         /// The collision.

@@ -102,6 +102,8 @@ impl Limits {
 
 /// Checks the whole input of a step.
 ///
+/// Of a collision of count 0 nothing else is looked at.
+///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
 pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
@@ -160,6 +162,9 @@ fn check_whole<'a>(
     end: impl Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
+    if collision.count == 0 {
+        return Ok(());
+    }
     let (body_a, body_b) = check_collision(index, collision, scene.needs.bodies)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
     let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
@@ -344,6 +349,20 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn of_an_empty_collision_nothing_else_is_looked_at() {
+        let nan = Contact { point: [f32::NAN; 3], distance: f32::NAN };
+        let normal = [f32::NAN, f32::INFINITY, 0.0];
+        let bodies = [body(0), body(1), body(0)];
+        for (body_a, body_b) in [(0, 1), (1, 1), (0, 2), (3, 0), (u32::MAX, u32::MAX)] {
+            let empty = Collision { body_a, body_b, normal, count: 0, contacts: [nan; 4] };
+            assert_eq!(validated(&bodies, &[empty]), Ok(()));
+            // Its place counts.
+            let refused = InputError::SelfCollision { collision: 1, body: 1 };
+            assert_eq!(validated(&bodies, &[empty, collision(1, 1)]), Err(refused));
+        }
+    }
+
+    #[test]
     fn more_bodies_than_the_capacity_are_refused() {
         assert_eq!(room(131_072, 0, &FLOAT), Ok(()));
         let text = room(131_073, 0, &FLOAT).expect_err("one too many").to_string();
@@ -495,7 +514,7 @@ pub(crate) mod tests {
         let length = text(InputError::NormalLength { collision: 12, length: 1.25 });
         assert!(length.contains("12") && length.contains("1.25") && length.contains("0.001"));
         let count = text(InputError::ContactCount { collision: 12, found: 7 });
-        assert!(count.contains("12") && count.contains('7') && count.contains("1 to 4"));
+        assert!(count.contains("12") && count.contains('7') && count.contains("at most 4"));
         let passes = text(InputError::TooManyIterations { solver: "friction", found: 300 });
         assert!(passes.contains("300") && passes.contains("friction") && passes.contains("255"));
         let orientation = text(InputError::Orientation { body: 3, length: 0.0 });

@@ -12,6 +12,7 @@ mod vectors;
 
 mod cheapest_order;
 mod check;
+mod empty;
 mod float_environment;
 mod interface;
 mod landing;
