@@ -35,7 +35,8 @@ pub(super) struct PackedStep {
     pub(super) id: PackId,
     pub(super) bank: Bank,
     pub(super) plan: Plan,
-    /// The sums of the words sent; `None` if no body moves and nothing is streamed.
+    /// The sums of the words sent; `None` if no body moves, or there is none, and nothing is
+    /// streamed.
     pub(super) sent: Option<SentSums>,
     pub(super) parameters: StepParameters,
     /// Number of the caller's bodies.

@@ -77,8 +77,8 @@ impl Device {
     }
 
     /// Writes the records of a step whose collisions `narrow_phase` writes one after the other.
-    /// Returns the sums of the words, and the written collisions. `refuse` names the error of a body
-    /// that the screening doubts.
+    /// Returns the sums of the words, unless the step has no bodies, and the written collisions.
+    /// `refuse` names the error of a body that the screening doubts.
     pub(super) fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         plan: &Plan,
@@ -87,7 +87,12 @@ impl Device {
         bodies: &B,
         refuse: impl FnOnce() -> Result<(), InputError>,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
-    ) -> Result<(SentSums, Written), InputError> {
+    ) -> Result<(Option<SentSums>, Written), InputError> {
+        if plan.bodies == 0 {
+            let mut writer = Writer::without_bodies(target, self.ends.ends(), plan.collisions);
+            narrow_phase(&mut writer);
+            return Ok((None, writer.finish()?));
+        }
         let SegmentBuffers { mut velocities, mut poses, mut entries } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
@@ -103,7 +108,7 @@ impl Device {
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let written = writer.finish()?;
-        Ok((SentSums { velocities, collisions: written.sum, poses }, written))
+        Ok((Some(SentSums { velocities, collisions: written.sum, poses }), written))
     }
 }
 

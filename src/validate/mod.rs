@@ -102,7 +102,8 @@ impl Limits {
 
 /// Checks the whole input of a step.
 ///
-/// Of a collision of count 0 nothing else is looked at.
+/// Of a collision of count 0 nothing else is looked at. A step without bodies needs no shapes, and
+/// fits every board.
 ///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
@@ -147,8 +148,10 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     let needs =
         SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &needs, limits)?;
-    check_room(&needs, limits)?;
-    check_shapes(shapes, &needs, limits)?;
+    if needs.bodies > 0 {
+        check_room(&needs, limits)?;
+        check_shapes(shapes, &needs, limits)?;
+    }
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
     Ok(Scene { shapes, needs, variant: &limits.variant, held, flush_subnormals })
@@ -200,9 +203,6 @@ pub(crate) struct Scene<'a> {
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     let SceneNeeds { bodies, collisions, .. } = *needs;
-    if bodies == 0 {
-        return Err(InputError::NoBodies);
-    }
     let refuse = |excess| Err(needs.refuse(excess, |_| true));
     let limit = limits.body_capacity;
     if exceeds(bodies, limit) {
@@ -344,8 +344,19 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_step_without_bodies_is_refused() {
-        assert_eq!(validated(&[], &[]), Err(InputError::NoBodies));
+    fn a_step_without_bodies_has_empty_collisions_alone() {
+        let empty = Collision { count: 0, ..collision(0, 1) };
+        assert_eq!(validated(&[], &[]), Ok(()));
+        assert_eq!(validated(&[], &[empty; 3]), Ok(()));
+        let refused = InputError::BodyIndex { collision: 1, side: 'A', found: 0, bodies: 0 };
+        assert_eq!(validated(&[], &[empty, collision(0, 1)]), Err(refused));
+        // Nothing is sent, so that nothing has to fit.
+        let none = Limits { body_capacity: 0, collision_capacity: 0, memory_bytes: 0, ..FLOAT };
+        let parameters = StepParameters::default();
+        assert_eq!(validate(&[][..], &[empty][..], &[], &parameters, &none), Ok(()));
+        // The parameters are checked as ever.
+        let parameters = StepParameters { time_step: 0.0, ..parameters };
+        assert!(validate(&[][..], &[][..], &SHAPES, &parameters, &FLOAT).is_err());
     }
 
     #[test]

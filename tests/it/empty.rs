@@ -1,10 +1,13 @@
-//! Tests that a collision without contact points has no effect and keeps its place.
+//! Tests that a collision without contact points has no effect and keeps its place, and that a step
+//! without bodies is a step.
 #![cfg(feature = "emulation")]
 
 use crate::common::{at_rest, bits, open_with, ordered, standing};
 use bitstream_model::BoardConfig;
 use scene::{Scene, SceneOptions};
-use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED, WINDOWED16};
+use zynq_pgs::interface::profile::{
+    FLOAT, HALF, MIXED, NAIVE, PROFILES, Profile, WINDOWED, WINDOWED16,
+};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, Body, Collision, CollisionArrays, Collisions, Contact, Error, InputError, Shape,
@@ -318,5 +321,127 @@ fn empty_collisions_are_written_too() {
         let given = pile.collisions.len();
         let counts = (report.collisions, report.empty);
         assert_eq!(counts, (given as u64, (all.len() - given) as u64));
+    }
+}
+
+/// Everything that a step without bodies counts is 0.
+fn is_zero(report: &StepReport) -> bool {
+    let counts = [
+        report.bodies,
+        report.collisions,
+        report.empty,
+        report.cycles.total,
+        report.cycles.work + report.cycles.stalls + report.cycles.waits,
+        report.bytes_to_device,
+        report.bytes_from_device,
+        report.hazards,
+        report.register_reads,
+        report.register_writes,
+        report.doorbells,
+        report.interrupts,
+        report.descriptors,
+    ];
+    counts == [0; 13] && report.impulse_sum == Some(0.0)
+}
+
+#[test]
+fn a_step_without_bodies_touches_no_register() {
+    let pile = Pile::new("2x2x2");
+    let empty: Vec<_> = pile.with_empty().into_iter().filter(|it| it.count == 0).collect();
+    for profile in PROFILES {
+        // Without shapes, and before and after another step.
+        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let (emulated, mut board) = open_with(config, None, &[]);
+        for round in 0..2 {
+            for order in ORDERS {
+                let mut parameters = StepParameters::default();
+                parameters.order = order;
+                let before = emulated.counts();
+                let mut none: Vec<Body> = Vec::new();
+                for collisions in [&[][..], &empty[..], &pile.collisions[..]] {
+                    let stepped = board.step(&mut none, collisions, &parameters);
+                    if collisions.iter().all(|collision| collision.count == 0) {
+                        let report = stepped.expect("a step");
+                        assert!(is_zero(&report), "{}: {report:?}", profile.name);
+                    } else {
+                        let found = stepped.expect_err("there is no body 0");
+                        let is_index = matches!(
+                            found,
+                            Error::Input(InputError::BodyIndex { collision: 0, bodies: 0, .. })
+                        );
+                        assert!(is_index, "{}: {found:?}", profile.name);
+                    }
+                }
+                let after = emulated.counts();
+                assert_eq!(
+                    (after.register_reads, after.register_writes),
+                    (before.register_reads, before.register_writes)
+                );
+            }
+            if round == 0 {
+                board.set_shapes(&pile.shapes).expect("shapes");
+                let mut bodies = pile.bodies.clone();
+                board.step(&mut bodies, &pile.collisions, &StepParameters::default()).expect("one");
+            }
+        }
+        assert_eq!(emulated.violations(), []);
+    }
+}
+
+#[test]
+fn a_step_without_bodies_is_submitted_prepared_and_written() {
+    let pile = Pile::new("2x2x2");
+    let mut none: Vec<Body> = Vec::new();
+    let nothing: &[Collision] = &[];
+    let parameters = StepParameters::default();
+    for profile in [&FLOAT, &MIXED, &WINDOWED] {
+        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let (emulated, mut board) = open_with(config, None, &pile.shapes);
+        let mut expected = pile.bodies.clone();
+        board.step(&mut expected, &pile.collisions, &parameters).expect("a step");
+
+        // Nothing, then bodies, then nothing.
+        let mut flight = board.submit(&none, nothing, &parameters).expect("a start");
+        let next = flight.prepare(&pile.bodies, &pile.collisions, &parameters).expect("memory");
+        let (report, started) = flight.wait_and_start(&mut none, &next);
+        assert!(is_zero(&report.expect("a step")));
+        let mut flight = started.expect("a start");
+        let next = flight.prepare(&none, nothing, &parameters).expect("nothing to prepare");
+        let mut bodies = pile.bodies.clone();
+        let (report, started) = flight.wait_and_start(&mut bodies, &next);
+        assert_eq!(report.expect("a step").bodies, pile.bodies.len() as u64);
+        assert_eq!(bits(&bodies), bits(&expected));
+        assert!(is_zero(&started.expect("a start").wait(&mut none).expect("a step")));
+        // It starts again, and a flight may be dropped.
+        drop(board.start(&next).expect("a start"));
+        let mut one = pile.bodies.clone();
+        let wrong = board.submit(&none, nothing, &parameters).expect("a start").wait(&mut one);
+        assert!(matches!(wrong, Err(Error::Input(InputError::OtherBodies { .. }))));
+
+        if profile.name != "windowed" {
+            let as_given = ordered(Order::AsGiven);
+            let empty = pile.with_empty()[0];
+            let written = board.write(&none, 70, &as_given, |records| {
+                (0..70).for_each(|_| records.push(&empty));
+                assert_eq!((records.len(), records.is_refused()), (70, false));
+            });
+            let written = written.expect("nothing is wrong");
+            let report = board.start(&written).expect("a start").wait(&mut none);
+            assert!(is_zero(&report.expect("a step")));
+            let refused = board.write(&none, 70, &as_given, |records| {
+                records.push(&empty);
+                records.push(&pile.collisions[0]);
+            });
+            let index = matches!(
+                refused,
+                Err(Error::Input(InputError::BodyIndex { collision: 1, bodies: 0, .. }))
+            );
+            assert!(index, "{refused:?}");
+        }
+        let mut bodies = pile.bodies.clone();
+        board.step(&mut bodies, &pile.collisions, &parameters).expect("a step");
+        assert_eq!(bits(&bodies), bits(&expected));
+        drop(board);
+        assert_eq!(emulated.violations(), []);
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use pgs_interface::record::Beat;
 use pgs_support::float_env::standard;
 
-use super::collisions::CollisionPacker;
+use super::collisions::{CollisionPacker, Seen};
 use super::stripe_writer::BLOCK;
 use super::target::Target;
 use crate::record::body_table::Ends;
@@ -20,8 +20,9 @@ use crate::validate::{Block, Quick};
 pub struct Writer<'a> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
-    packer: CollisionPacker<'a, 'a>,
-    /// Collisions whose records are made.
+    /// `None` for a step without bodies, which has no records.
+    packer: Option<CollisionPacker<'a, 'a>>,
+    /// Collisions that were looked at, and whose records are made.
     done: usize,
     /// Those among them that are padding.
     paddings: usize,
@@ -64,10 +65,17 @@ impl<'a> Writer<'a> {
         room: usize,
         channels: &'a mut [&'a mut [Beat]],
     ) -> Self {
+        let packer = CollisionPacker::new(target, ends, None, 0, channels);
+        Self { packer: Some(packer), ..Self::without_bodies(target, ends, room) }
+    }
+
+    /// As [`Self::new`], for a step without bodies. All of its collisions must be without contact
+    /// points.
+    pub(crate) fn without_bodies(target: Target<'a>, ends: Ends<'a>, room: usize) -> Self {
         Self {
             quick: target.quick,
             ends,
-            packer: CollisionPacker::new(target, ends, None, 0, channels),
+            packer: None,
             done: 0,
             paddings: 0,
             block: [Collision::NOTHING; BLOCK],
@@ -137,7 +145,13 @@ impl<'a> Writer<'a> {
             return;
         }
         let (first, collisions) = (self.done, Contiguous(&self.block[..count]));
-        let seen = self.packer.write(collisions);
+        let seen = match &mut self.packer {
+            Some(packer) => packer.write(collisions),
+            None => {
+                let good = self.block[..count].iter().all(|collision| collision.count == 0);
+                Seen { good, paddings: count }
+            }
+        };
         self.done += count;
         self.paddings += seen.paddings;
         if !seen.good {
@@ -160,7 +174,8 @@ impl<'a> Writer<'a> {
             Some(refused) => Err(refused),
             None => {
                 let Self { done: collisions, paddings, packer, .. } = self;
-                Ok(Written { sum: packer.finish(), collisions, paddings })
+                let sum = packer.map_or(0, CollisionPacker::finish);
+                Ok(Written { sum, collisions, paddings })
             }
         }
     }

@@ -59,10 +59,10 @@ frame:
                                    Only the first contact_npoints of the four are read
 
 A collision of 0 points is empty: it has no effect, and none of its other values matters. A step
-needs at least one body. One without collisions has contact arrays of M = 0; an array without rows
-may also have shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position
-coefficient equal to the time step, a distance is a velocity in m/s: a negative one is the least
-speed of separation, and a positive one the greatest speed of approach.
+without bodies or collisions has arrays of N = 0 or M = 0; an array without rows may also have
+shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
+equal to the time step, a distance is a velocity in m/s: a negative one is the least speed of
+separation, and a positive one the greatest speed of approach.
 
 --no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic
 terms, motion. Poses stay unchanged.
@@ -157,9 +157,7 @@ pub(crate) fn run(
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
-    let stepped = opened
-        .accelerator
-        .set_shapes(&folder.shapes)
+    let stepped = step_input::set_shapes(&mut opened.accelerator, &folder.shapes)
         .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters));
     if stepped.is_ok() {
         opened.alive()?;
