@@ -55,8 +55,8 @@ impl CollisionPacker {
         survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
         let entries = Entries { collisions, count, added: None, words: None };
         let packers = &mut PackPool::alone();
-        let (sum, good) = pack_collisions(target, self.ends.ends(), &entries, channels, packers);
-        good.then_some(sum)
+        let (sum, seen) = pack_collisions(target, self.ends.ends(), &entries, channels, packers);
+        seen.good.then_some(sum)
     }
 }
 
@@ -179,13 +179,10 @@ impl StepPacker {
         let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
         let entries = Entries { collisions, count, added, words: None };
-        pack_collisions(
-            target,
-            self.ends.ends(),
-            &entries,
-            &mut channels[active],
-            &mut self.packers,
-        )
+        let channels = &mut channels[active];
+        let (sum, seen) =
+            pack_collisions(target, self.ends.ends(), &entries, channels, &mut self.packers);
+        (sum, seen.good)
     }
 }
 

@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn each_error_says_what_to_do_next() {
         let answers = |error: &Error| (error.is_input(), error.may_retry(), error.must_reopen());
-        assert_eq!(answers(&Error::Input(InputError::NoBodies)), (true, false, false));
+        assert_eq!(answers(&Error::Input(InputError::NoShapes)), (true, false, false));
         assert_eq!(answers(&step(Aftermath::Ready)), (false, true, false));
         assert_eq!(answers(&step(Aftermath::Untouched)), (false, false, false));
         assert_eq!(answers(&step(Aftermath::MustReopen)), (false, false, true));

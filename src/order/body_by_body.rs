@@ -73,8 +73,8 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
     let count = input.moving.len();
     // The collisions of body `b` are `of[starts[b]..starts[b + 1]]`, in ascending order.
     let mut starts = vec![0_usize; count + 1];
-    for body in input.pairs.iter().flatten() {
-        starts[*body as usize + 1] += 1;
+    for body in input.taking_part().flat_map(|(_, pair)| pair) {
+        starts[body as usize + 1] += 1;
     }
     let left = (0..count).map(|body| u32::try_from(starts[body + 1]).unwrap_or(u32::MAX)).collect();
     for body in 0..count {
@@ -82,10 +82,10 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
     }
     let mut next = starts.clone();
     let mut of = vec![0_u32; 2 * input.pairs.len()];
-    for (index, pair) in (0..).zip(input.pairs) {
-        for body in pair {
-            of[next[*body as usize]] = index;
-            next[*body as usize] += 1;
+    for (index, pair) in input.taking_part() {
+        for body in pair.map(|body| body as usize) {
+            of[next[body]] = index;
+            next[body] += 1;
         }
     }
 
@@ -110,7 +110,7 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
         }
     }
     // Pairs of two static bodies belong to no body's turn and come last.
-    let rest = (0..).zip(&done).filter(|(_, done)| !**done).map(|(index, _)| index);
+    let rest = input.taking_part().map(|(index, _)| index).filter(|index| !done[*index as usize]);
     schedule.entries.extend(rest);
 }
 

@@ -21,7 +21,8 @@ impl Checker {
     }
 
     /// Verifies that every collision is in the schedule exactly once, and that no moving body is
-    /// used twice within the window.
+    /// used twice within the window. A collision without contact points may be left out, and uses no
+    /// body.
     ///
     /// # Errors
     /// [`OrderError`]: the input cannot be ordered, or the first entry at which the schedule is
@@ -50,6 +51,9 @@ impl Checker {
                 if std::mem::replace(&mut self.seen[index as usize], true) {
                     return Err(OrderError::Repeated { collision: index, entry });
                 }
+                if !OrderInput::takes_part(*pair) {
+                    continue;
+                }
                 for body in *pair {
                     let free_from = &mut self.free_from[body as usize];
                     if *free_from > slot {
@@ -61,7 +65,8 @@ impl Checker {
                 }
             }
         }
-        match self.seen.iter().position(|seen| !seen) {
+        let lacks = |(seen, pair): (&bool, &[u32; 2])| !*seen && OrderInput::takes_part(*pair);
+        match self.seen.iter().zip(input.pairs).position(lacks) {
             Some(collision) => Err(OrderError::Missing { collision }),
             None => Ok(()),
         }

@@ -10,7 +10,7 @@ use super::{OrderInput, Schedule};
 pub(super) fn order(input: &OrderInput<'_>, schedule: &mut Schedule) -> usize {
     schedule.clear();
     let mut colours = 0;
-    let mut todo: Vec<u32> = (0..).zip(input.pairs).map(|(index, _)| index).collect();
+    let mut todo: Vec<u32> = input.taking_part().map(|(index, _)| index).collect();
     let mut later = Vec::new();
     while !todo.is_empty() {
         let mut had = vec![0_u64; input.moving.len()];

@@ -3,12 +3,13 @@
 use pgs_support::float_env::standard;
 
 use super::OrderError;
-use crate::scene::{Bodies, Collisions, Shape};
+use crate::scene::{Bodies, Collision, Collisions, Shape};
 
 /// The input of an order.
 #[derive(Debug, Clone, Copy)]
 pub struct OrderInput<'a> {
-    /// Bodies A and B of each collision.
+    /// Bodies A and B of each collision; [`EMPTY`](Self::EMPTY) for a collision without contact
+    /// points.
     pub pairs: &'a [[u32; 2]],
     /// Whether each body moves. A static body causes no hazard.
     pub moving: &'a [bool],
@@ -17,6 +18,28 @@ pub struct OrderInput<'a> {
 }
 
 impl OrderInput<'_> {
+    /// The pair of a collision without contact points. No body has such an index.
+    ///
+    /// [`Order::AsGiven`](super::Order::AsGiven) leaves its entry empty, every other order leaves it
+    /// out.
+    pub const EMPTY: [u32; 2] = [u32::MAX; 2];
+
+    /// Whether a collision has contact points.
+    #[inline]
+    pub(super) fn takes_part(pair: [u32; 2]) -> bool {
+        pair != Self::EMPTY
+    }
+
+    /// The collisions with contact points: index and pair.
+    pub(super) fn taking_part(&self) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
+        (0..).zip(self.pairs.iter().copied()).filter(|(_, pair)| Self::takes_part(*pair))
+    }
+
+    /// Number of collisions with contact points.
+    pub(crate) fn collisions(&self) -> usize {
+        self.taking_part().count()
+    }
+
     /// Refuses input that cannot be ordered. Reports the error with the lowest index.
     pub(super) fn check(&self) -> Result<(), OrderError> {
         let bodies = self.moving.len();
@@ -33,11 +56,14 @@ impl OrderInput<'_> {
         too_many("collisions", self.pairs.len(), 1 << 30)?;
         let limit = u32::try_from(bodies).unwrap_or(u32::MAX);
         // This test has no branch per pair.
-        let wrong = |[a, b]: [u32; 2]| (a >= limit) | (b >= limit) | (a == b);
+        let wrong = |pair @ [a, b]: [u32; 2]| {
+            Self::takes_part(pair) & ((a >= limit) | (b >= limit) | (a == b))
+        };
         if !self.pairs.iter().fold(false, |any, pair| any | wrong(*pair)) {
             return Ok(());
         }
-        for (collision, [a, b]) in self.pairs.iter().copied().enumerate() {
+        for (index, [a, b]) in self.taking_part() {
+            let collision = usize::try_from(index).unwrap_or(usize::MAX);
             if let Some(body) = [a, b].into_iter().find(|body| *body >= limit) {
                 return Err(OrderError::NoSuchBody { collision, body, bodies });
             }
@@ -66,7 +92,7 @@ impl InputBuffers {
     }
 
     /// Reads the input of an order. A body whose shape is not in `shapes` does not move; a step
-    /// refuses it.
+    /// refuses it. Of a collision of count 0 only the count matters.
     pub fn gather<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -86,7 +112,12 @@ impl InputBuffers {
         self.pairs.clear();
         self.pairs.extend((0..collisions.len()).map(|index| {
             let collision = collisions.collision(index);
-            [collision.body_a, collision.body_b]
+            if collision.is_empty() {
+                return OrderInput::EMPTY;
+            }
+            // Two bodies that do not exist must not look like no bodies. The error names A.
+            let Collision { body_a, body_b, .. } = collision;
+            [body_a, body_b.min(u32::MAX - u32::from(body_a == u32::MAX))]
         }));
         self.moving.clear();
         self.positions.clear();

@@ -4,6 +4,7 @@ use pgs_support::float_env::standard;
 
 use super::groups::Groups;
 use super::interlock::{Interlock, StallCounter};
+use super::schedule::EMPTY;
 use super::sweep::Sweep;
 use super::tail::Tail;
 use super::{IssueWindow, Order, OrderError, OrderInput, Schedule, body_by_body, colours};
@@ -57,7 +58,8 @@ impl Orderer {
     /// Orders the collisions of a step.
     ///
     /// Only the orders without hazards use the window. The order is a function of the arguments
-    /// alone.
+    /// alone. Collisions without contact points ([`OrderInput::EMPTY`]) change nothing for the
+    /// others.
     ///
     /// # Errors
     /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
@@ -83,10 +85,7 @@ impl Orderer {
         let schedule = &mut self.schedule;
         let mut made = order;
         match order {
-            Order::AsGiven => {
-                schedule.clear();
-                schedule.entries.extend((0..).zip(input.pairs).map(|(index, _): (u32, _)| index));
-            }
+            Order::AsGiven => as_given(input, schedule),
             Order::BodyByBody(ties) => body_by_body::order(input, ties, schedule),
             Order::Colours => {
                 colours::order(input, schedule);
@@ -97,7 +96,8 @@ impl Orderer {
             }
             Order::HazardFreeNearby => {
                 self.sweep.as_given(input);
-                let most = nearby_entries_max(input.pairs.len(), self.most_uses(input), window);
+                let collisions = self.sweep.collisions.len();
+                let most = nearby_entries_max(collisions, self.most_uses(input), window);
                 if self.place(window, self.limit.min(most)).is_err() {
                     made = Order::HazardFree;
                     self.sweep.run(input);
@@ -116,7 +116,8 @@ impl Orderer {
     /// Such a pipeline waits by itself, and the order has no empty entries. A body with many
     /// collisions makes both orders wait about as long. The order as given is therefore taken
     /// unless the other one saves more than one cycle in a hundred, and wherever there is no window
-    /// to order for. Time and memory are linear in the input.
+    /// to order for. Neither order has collisions without contact points. Time and memory are linear
+    /// in the input.
     ///
     /// # Errors
     /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
@@ -129,8 +130,8 @@ impl Orderer {
     ) -> Result<OrderCosts, OrderError> {
         input.check()?;
         self.made = Order::AsGiven;
-        let given = || (0..).zip(input.pairs).map(|(index, _): (u32, _)| index);
-        let collisions = input.pairs.len();
+        let given = || input.taking_part().map(|(index, _)| index);
+        let collisions = input.collisions();
         let uses = self.most_uses(input);
         let no_order_beats =
             pipeline.cycles_without_hazards(collisions).max(pipeline.cycles_of_one_body(uses));
@@ -167,12 +168,18 @@ impl Orderer {
         Ok(OrderCosts { as_given, reordered: Some(reordered) })
     }
 
+    /// Makes [`Order::AsGiven`] without the empty entries, of an input that was ordered before.
+    pub(crate) fn as_given_without_empty(&mut self, input: &OrderInput<'_>) {
+        as_given(input, &mut self.schedule);
+        self.schedule.drop_empty();
+    }
+
     /// Collisions of the moving body that has the most.
     fn most_uses(&mut self, input: &OrderInput<'_>) -> usize {
         self.uses.clear();
         self.uses.resize(input.moving.len(), 0);
-        for body in input.pairs.as_flattened() {
-            self.uses[*body as usize] += 1;
+        for body in input.taking_part().flat_map(|(_, pair)| pair) {
+            self.uses[body as usize] += 1;
         }
         let moving = self.uses.iter().zip(input.moving).filter(|(_, moving)| **moving);
         moving.map(|(uses, _)| *uses as usize).max().unwrap_or(0)
@@ -198,6 +205,17 @@ impl Orderer {
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
+}
+
+/// Makes the order as given. The entry of a collision without contact points is empty.
+fn as_given(input: &OrderInput<'_>, schedule: &mut Schedule) {
+    schedule.clear();
+    let entry = |(index, pair): (u32, &[u32; 2])| match OrderInput::takes_part(*pair) {
+        true => index,
+        false => EMPTY,
+    };
+    schedule.entries.extend((0..).zip(input.pairs).map(entry));
+    schedule.empty = input.pairs.len() - input.collisions();
 }
 
 /// Largest number of entries of [`Order::HazardFreeNearby`] for `collisions` collisions, if the

@@ -115,7 +115,9 @@ fn lives(
             return Err(OrderError::NoSuchCollision { entry, found, collisions });
         };
         let slot = entry / per_issue as usize;
-        let moving = pair.iter().copied().filter(|body| input.moving[*body as usize]);
+        // A collision without contact points has no bodies.
+        let moves = |body: &u32| input.moving.get(*body as usize) == Some(&true);
+        let moving = pair.iter().copied().filter(moves);
         for body in moving.clone() {
             let life = lives[body as usize].get_or_insert((slot, slot));
             life.1 = slot;

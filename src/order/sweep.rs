@@ -63,19 +63,19 @@ impl Sweep {
     /// Sweeps the collisions of an input that was checked.
     pub(super) fn run(&mut self, input: &OrderInput<'_>) {
         self.rank(input);
-        self.sort(input.pairs);
+        self.sort(input);
     }
 
     /// Takes the collisions of a checked input in their given order.
     pub(super) fn as_given(&mut self, input: &OrderInput<'_>) {
-        let OrderInput { pairs, moving, .. } = *input;
+        let moving = input.moving;
         #[allow(clippy::cast_possible_truncation, reason = "an index of each is a u32: checked")]
         let static_rank = moving.len() as u32;
         let rank = |body: u32| if moving[body as usize] { body } else { static_rank };
-        let swept = |(index, pair): (u32, &[u32; 2])| Swept { ranks: pair.map(rank), index };
+        let swept = |(index, pair): (u32, [u32; 2])| Swept { ranks: pair.map(rank), index };
         self.moving_count = static_rank;
         self.collisions.clear();
-        self.collisions.extend((0..).zip(pairs).map(swept));
+        self.collisions.extend(input.taking_part().map(swept));
     }
 
     /// Ranks the moving bodies along the axis.
@@ -113,18 +113,18 @@ impl Sweep {
     }
 
     /// Sorts the collisions by the sum of their bodies' ranks.
-    fn sort(&mut self, pairs: &[[u32; 2]]) {
+    fn sort(&mut self, input: &OrderInput<'_>) {
         let sums = 2 * self.moving_count as usize + 1;
         let mut shift = 0;
         while sums >> shift >= BUCKETS_MAX {
             shift += 1;
         }
         let ranks = &self.ranks;
-        let ranks_of = |pair: &[u32; 2]| pair.map(|body| ranks[body as usize]);
+        let ranks_of = |pair: [u32; 2]| pair.map(|body| ranks[body as usize]);
         self.buckets.clear();
         self.buckets.resize((sums >> shift) + 1, 0);
         self.bucket_of.clear();
-        for pair in pairs {
+        for (_, pair) in input.taking_part() {
             let [a, b] = ranks_of(pair);
             // A collision with a static body stands at its other body.
             let (from_a, from_b) =
@@ -136,8 +136,8 @@ impl Sweep {
             self.bucket_of.push(bucket);
         }
         to_starts(&mut self.buckets);
-        self.collisions.resize(pairs.len(), Swept::default());
-        for (index, (pair, bucket)) in (0..).zip(pairs.iter().zip(&self.bucket_of)) {
+        self.collisions.resize(self.bucket_of.len(), Swept::default());
+        for ((index, pair), bucket) in input.taking_part().zip(&self.bucket_of) {
             let next = &mut self.buckets[usize::from(*bucket)];
             let ranks = ranks_of(pair).map(|rank| rank.min(self.moving_count));
             self.collisions[*next as usize] = Swept { ranks, index };

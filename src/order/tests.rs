@@ -1,5 +1,7 @@
 //! Properties of every order, in every scene.
 
+mod empty;
+
 use proptest::prelude::*;
 
 use super::orderer::nearby_entries_max;

@@ -198,9 +198,15 @@ impl<'a> Counted<'a> {
 }
 
 impl<'a> From<&'a Collision> for Counted<'a> {
-    /// A collision with any number of contact points.
+    /// A collision with any number of contact points. [`Collision::NOTHING`] replaces a collision
+    /// with none, whose other values may be anything.
     #[inline(always)]
     fn from(collision: &'a Collision) -> Self {
+        if collision.is_empty() {
+            // Most scenes have none, so the processor predicts this branch.
+            pgs_support::cold_path();
+            return Self { collision: &Collision::NOTHING, full: false };
+        }
         Self { collision, full: false }
     }
 }
@@ -263,6 +269,17 @@ const _: () = assert!(WORD_LANE == 3);
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_record_does_not_depend_on_the_other_values_of_an_empty_collision() {
+        let nan = Contact { point: [f32::NAN; 3], distance: f32::NAN };
+        let (normal, contacts) = ([f32::INFINITY; 3], [nan; CONTACT_POINTS]);
+        let empty = Collision { body_a: 7, body_b: u32::MAX, normal, count: 0, contacts };
+        let of = Counted::from(&empty);
+        assert_eq!((*of.collision, of.count()), (Collision::NOTHING, 0));
+        let one = Collision { count: 1, ..empty };
+        assert_eq!(Counted::from(&one).collision.body_a, 7);
+    }
 
     #[test]
     fn magnitudes_that_are_used_are_those_of_what_is_used() {

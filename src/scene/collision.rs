@@ -24,7 +24,12 @@ pub struct Contact {
     pub distance: f32,
 }
 
-/// Two bodies in contact at one to four points.
+/// Two bodies in contact at one to four points, or a place without contacts.
+///
+/// A collision of count 0 is empty: it affects no body, whatever the order and the bitstream, and
+/// keeps its index, so that the collisions behind it keep theirs. Nothing of it is looked at but the
+/// count: its bodies need not exist or differ, its numbers need not be finite. It counts like any
+/// other against the number of collisions that a bitstream takes.
 ///
 /// Either body may be A, as long as the normal points from B to A and the contact points lie on B.
 /// One of them may be static. All points share the normal: a manifold with several normals, such as
@@ -40,7 +45,7 @@ pub struct Collision {
     pub body_b: u32,
     /// Unit normal, world frame, pointing from B to A: the direction in which A is pushed.
     pub normal: [f32; 3],
-    /// Number of contact points, 1 to [`CONTACT_POINTS`], and the friction of the pair, if it has one
+    /// Number of contact points, 0 to [`CONTACT_POINTS`], and the friction of the pair, if it has one
     /// of its own: [`with_friction`](Self::with_friction) puts it above the number.
     pub count: u32,
     /// The contact points; the elements from `count` on are ignored.
@@ -72,6 +77,13 @@ impl Collision {
     pub(crate) const fn has_finite_friction(&self) -> bool {
         const EXPONENT: u32 = 0x7C00 << layout::FRICTION_SHIFT;
         self.count & EXPONENT != EXPONENT
+    }
+
+    /// Whether it has no contact points, and so no effect, whatever its other words are.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.points() == 0
     }
 
     /// The number of contact points, without the friction.
@@ -177,7 +189,7 @@ pub struct CollisionArrays<'a> {
     pub bodies: &'a [[u32; 2]],
     /// Unit normals from B to A.
     pub normals: &'a [[f32; 3]],
-    /// Numbers of contact points.
+    /// Numbers of contact points; 0 for an empty collision.
     pub counts: &'a [u32],
     /// Contact points: x, y, z on B's surface, and signed distance, m.
     pub contacts: &'a [[[f32; 4]; CONTACT_POINTS]],

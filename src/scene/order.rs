@@ -1,10 +1,15 @@
 //! The order in which a caller wants the collisions to be solved.
 
 /// A kind of order.
+///
+/// [Empty collisions](crate::Collision) change no order of the others. The board gets none of them,
+/// but for the order as given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Order {
-    /// As given. Sorted collisions use the same body many times in a row: hazards abound.
+    /// As given. Sorted collisions use the same body many times in a row: hazards abound. Where a
+    /// caller asks for this order, the board gets an empty collision as padding, which takes its
+    /// place among the others; only a bitstream that keeps live bodies alone gets none.
     AsGiven,
     /// Body by body, as the thesis proposes (§4.7): few bodies alive, nearly every use a hazard.
     BodyByBody(Ties),

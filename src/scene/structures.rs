@@ -11,8 +11,8 @@ pub enum Structures<'a> {
     Ordered {
         /// The array.
         all: &'a [Collision],
-        /// The index of each collision in `all`. An index past the end stands for a collision
-        /// without contact points. It has no effect, and a step refuses it in a caller's input.
+        /// The index of each collision in `all`. An index past the end stands for an empty
+        /// collision, whose count is 0.
         order: &'a [u32],
     },
 }

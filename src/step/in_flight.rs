@@ -35,7 +35,7 @@ pub struct InFlight<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flight {
     pub(super) step: PackedStep,
-    /// `None` where no body moves and nothing is streamed.
+    /// `None` where no body moves, or there is none, and nothing is streamed.
     pub(super) started: Option<Started>,
     pub(super) watch: Stopwatch,
     /// Register reads and writes before the step.
@@ -107,7 +107,7 @@ impl<'a> InFlight<'a> {
         flight.watch.lap();
         let device = &mut accelerator.device;
         let (Some(Started { deadline, doorbells }), Some(sent)) = (flight.started, sent) else {
-            // No body moves, and nothing is streamed.
+            // Nothing was streamed.
             let counts = device.capabilities.impulse_sum;
             let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
             return Ok(Ended { counters, report: self.report(&counters) });

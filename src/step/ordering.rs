@@ -1,9 +1,9 @@
 //! Puts the collisions of a step in the order of sending.
 //!
-//! The caller's own order needs no work: the collisions are packed as they are. For another order
-//! this module reads pairs, positions and masses into memory that it keeps from step to step,
-//! orders the collisions, and verifies on request that no hazard is left. Where the board keeps
-//! only live bodies, every body then gets its place.
+//! The caller's own order needs no work: the collisions are packed as they are, those without
+//! contact points as padding. For another order this module reads pairs, positions and masses into
+//! memory that it keeps from step to step, orders the collisions, and verifies on request that no
+//! hazard is left. Where the board keeps only live bodies, every body then gets its place.
 
 use pgs_interface::profile::Flow;
 
@@ -34,6 +34,9 @@ pub(super) struct OrderSummary {
     pub(super) choice: OrderChoice,
     /// Whether there is a schedule; without one the collisions stay as given.
     pub(super) scheduled: bool,
+    /// Number of collisions without contact points, which no entry of the schedule holds; 0 without
+    /// a schedule.
+    pub(super) empty: usize,
     /// The measured properties of the order, if it was to be verified.
     pub(super) verified: Option<OrderReport>,
     /// The demand of the order on a design that keeps live bodies alone.
@@ -44,7 +47,7 @@ impl OrderSummary {
     /// The summary of collisions that are sent as the caller gives them.
     pub(super) const fn as_given(choice: OrderChoice) -> Self {
         let order = Order::AsGiven;
-        Self { order, choice, scheduled: false, verified: None, live: None }
+        Self { order, choice, scheduled: false, empty: 0, verified: None, live: None }
     }
 }
 
@@ -91,19 +94,25 @@ impl Ordering {
         };
         let window = IssueWindow::of(context.capabilities, parameters)?;
         let mut input = self.buffers.gather(bodies, collisions, context.shapes);
+        let empty = input.pairs.len() - input.collisions();
         let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
         if design.is_some() && passes == 0 {
             // Without a pass the board takes no collisions.
             input.pairs = &[];
         }
         self.orderer.set_limit(context.entries_max(input.moving.len()));
-        let schedule = match self.orderer.order(&input, order, window) {
-            Ok(schedule) => schedule,
+        match self.orderer.order(&input, order, window) {
+            Ok(_) => {}
             Err(OrderError::TooLong { depth, limit, .. }) => {
                 return Err(too_long(&input, depth, limit, parameters, context.shapes));
             }
             Err(error) => return Err(error.into()),
-        };
+        }
+        if design.is_some() && order == Order::AsGiven {
+            // An entry without a collision would lengthen the lives of the bodies around it.
+            self.orderer.as_given_without_empty(&input);
+        }
+        let schedule = self.orderer.schedule();
         let verified = match parameters.verify_order {
             true => {
                 self.checker.verify(schedule, &input, window)?;
@@ -122,7 +131,8 @@ impl Ordering {
             }
             None => None,
         };
-        Ok(OrderSummary { order: self.orderer.made(), choice, scheduled: true, verified, live })
+        let order = self.orderer.made();
+        Ok(OrderSummary { order, choice, scheduled: true, empty, verified, live })
     }
 
     /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order that
@@ -141,10 +151,14 @@ impl Ordering {
         let pipeline = Interlock::of(context.capabilities, parameters);
         let costs = self.orderer.cheapest(&input, window, &pipeline)?;
         let (order, choice) = (self.orderer.made(), OrderChoice::Cheapest(costs));
-        Ok(match order {
-            Order::AsGiven => OrderSummary::as_given(choice),
-            _ => OrderSummary { order, choice, scheduled: true, verified: None, live: None },
-        })
+        let empty = input.pairs.len() - input.collisions();
+        if order == Order::AsGiven {
+            if empty == 0 {
+                return Ok(OrderSummary::as_given(choice));
+            }
+            self.orderer.as_given_without_empty(&input);
+        }
+        Ok(OrderSummary { order, choice, scheduled: true, empty, verified: None, live: None })
     }
 
     /// The schedule of the last order.
@@ -207,7 +221,7 @@ fn too_long(
     parameters: &StepParameters,
     shapes: &[Shape],
 ) -> InputError {
-    let (bodies, collisions) = (input.moving.len(), input.pairs.len());
+    let (bodies, collisions) = (input.moving.len(), input.collisions());
     let mut uses = vec![0_usize; bodies];
     for body in input.pairs.as_flattened() {
         let body = usize::try_from(*body).unwrap_or(usize::MAX);
@@ -244,7 +258,7 @@ fn too_crowded(
     input: &OrderInput<'_>,
     shapes: &[Shape],
 ) -> InputError {
-    let (bodies, collisions) = (input.moving.len(), input.pairs.len());
+    let (bodies, collisions) = (input.moving.len(), input.collisions());
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
     let (excess, held) = match error {

@@ -7,6 +7,7 @@ use super::report::HostTimes;
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
 use super::unique_id::UniqueId;
+use crate::beat::pack::collisions::Seen;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
@@ -22,13 +23,15 @@ pub(super) struct PackedStep {
     pub(super) id: UniqueId,
     pub(super) bank: Bank,
     pub(super) plan: Plan,
-    /// The sums of the words sent; `None` if no body moves and nothing is streamed.
+    /// The sums of the words sent; `None` if no body moves, or there is none, and nothing is
+    /// streamed.
     pub(super) sent: Option<SentSums>,
     pub(super) parameters: StepParameters,
     /// Number of the caller's bodies.
     pub(super) bodies: usize,
+    /// Number of the caller's collisions with contact points.
     pub(super) collisions: usize,
-    /// Empty entries that the order added.
+    /// Empty entries that are sent.
     pub(super) empty: usize,
     pub(super) order_summary: OrderSummary,
     /// `Accelerator::shapes_loaded` at the time of packing.
@@ -77,27 +80,25 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
     /// Lays the step out over the channels.
     fn plan(&self, ordering: &Ordering, order_summary: &OrderSummary) -> Plan {
         let lives = order_summary.live.map(|_| ordering.lives());
+        let bodies = lives.map_or(self.bodies.len(), |lives| lives.velocities().len());
         let collisions = match lives {
+            // Nothing is streamed.
+            _ if bodies == 0 => 0,
             Some(lives) => lives.words().len(),
             None if order_summary.scheduled => ordering.schedule().len(),
             None => self.collisions.len(),
         };
-        Plan {
-            bodies: lives.map_or(self.bodies.len(), |lives| lives.velocities().len()),
-            collisions,
-            passes: self.parameters.passes(),
-            variant: self.limits.variant,
-        }
+        Plan { bodies, collisions, passes: self.parameters.passes(), variant: self.limits.variant }
     }
 
-    /// Writes the records into the bank. Returns `false` if the screening doubts the input.
+    /// Writes the records into the bank. Returns what the screening saw of the input.
     fn pack(
         &self,
         device: &mut Device,
         (ordering, order_summary): (&Ordering, &OrderSummary),
         (plan, bank): (&Plan, Bank),
         scene: Scene<'a>,
-    ) -> (SentSums, bool) {
+    ) -> (SentSums, Seen) {
         let Self { bodies, collisions, shapes, .. } = *self;
         let quick = Quick::new(scene);
         let (lives, quick) = (order_summary.live.map(|_| ordering.lives()), Some(&quick));
@@ -137,8 +138,9 @@ impl Accelerator {
 
         let ordering = &orderings[bank];
         let plan = input.plan(ordering, &order_summary);
-        let all_sent =
-            !order_summary.scheduled || ordering.schedule().collisions() == collisions.len();
+        let given = collisions.len();
+        let ordered = ordering.schedule().collisions();
+        let all_sent = !order_summary.scheduled || ordered + order_summary.empty == given;
         let cancelled = engines == Engines::Idle && device.check_cancelled().is_err();
         // Packing screens everything that it sends. The full check is for the rest: input that is
         // not sent, and input whose error another error would hide.
@@ -148,23 +150,23 @@ impl Accelerator {
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 
-        let mut sent = None;
+        let (mut sent, mut paddings) = (None, 0);
         if plan.bodies > 0 {
-            let (sums, passed) =
-                input.pack(device, (ordering, &order_summary), (&plan, bank), scene);
-            if !passed {
+            let (sums, seen) = input.pack(device, (ordering, &order_summary), (&plan, bank), scene);
+            if !seen.good {
                 input.check_all()?;
                 // The input is right now, and was not right when it was packed.
                 return Err(InputError::Unsteady.into());
             }
-            sent = Some(sums);
+            (sent, paddings) = (Some(sums), seen.paddings);
         }
         host.pack = watch.lap();
 
-        // Entries that fill the last issue count as added by the order, too.
-        let empty = match order_summary.scheduled {
-            true => plan.collisions.saturating_sub(ordering.schedule().collisions()),
-            false => 0,
+        let without_points = match (sent, order_summary.scheduled) {
+            // Nothing could move, so that validation has refused every other collision.
+            (None, _) => given,
+            (Some(_), true) => order_summary.empty,
+            (Some(_), false) => paddings,
         };
         Ok(self.keep(PackedStep {
             id: UniqueId::new(),
@@ -173,8 +175,8 @@ impl Accelerator {
             sent,
             parameters: *parameters,
             bodies: bodies.len(),
-            collisions: collisions.len(),
-            empty,
+            collisions: given.saturating_sub(without_points),
+            empty: paddings,
             order_summary,
             shapes_loaded: self.shapes_loaded,
             host,

@@ -4,9 +4,9 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
 use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
-use crate::beat::pack::collisions::{Entries, pack_collisions};
+use crate::beat::pack::collisions::{Entries, Seen, pack_collisions};
 use crate::beat::pack::target::Target;
-use crate::beat::pack::writer::Writer;
+use crate::beat::pack::writer::{Writer, Written};
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
@@ -40,14 +40,14 @@ pub(super) struct PackInput<'a, B: ?Sized, C: ?Sized> {
 }
 
 impl Device {
-    /// Writes the records of a step into the buffers of a bank. Returns the sums of the words, and
-    /// whether the screening passed all input.
+    /// Writes the records of a step into the buffers of a bank. Returns the sums of the words,
+    /// whether the screening passed all input, and the number of paddings.
     pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
         input: &PackInput<'_, B, C>,
-    ) -> (SentSums, bool) {
+    ) -> (SentSums, Seen) {
         let PackInput { bodies, collisions, added, lives, shapes, quick } = *input;
         let SegmentBuffers { mut velocities, mut poses, mut entries } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
@@ -71,14 +71,15 @@ impl Device {
         self.statics[bank].retain(|body| rests(bodies, *body));
         let words = lives.map(Lives::words);
         let of_entries = Entries { collisions, count: plan.collisions, added, words };
-        let (collisions, passed) =
+        let (collisions, mut seen) =
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
-        (SentSums { velocities, collisions, poses }, bodies_passed & passed)
+        seen.good &= bodies_passed;
+        (SentSums { velocities, collisions, poses }, seen)
     }
 
-    /// Writes the records of a step whose collisions `narrow_phase` writes one after the other, and
-    /// returns the number of collisions. `refuse` names the error of a body that the screening
-    /// doubts.
+    /// Writes the records of a step whose collisions `narrow_phase` writes one after the other.
+    /// Returns the sums of the words, unless the step has no bodies, and the written collisions.
+    /// `refuse` names the error of a body that the screening doubts.
     pub(super) fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         plan: &Plan,
@@ -87,7 +88,12 @@ impl Device {
         bodies: &B,
         refuse: impl FnOnce() -> Result<(), InputError>,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
-    ) -> Result<(SentSums, usize), InputError> {
+    ) -> Result<(Option<SentSums>, Written), InputError> {
+        if plan.bodies == 0 {
+            let mut writer = Writer::without_bodies(target, self.ends.ends(), plan.collisions);
+            narrow_phase(&mut writer);
+            return Ok((None, writer.finish()?));
+        }
         let SegmentBuffers { mut velocities, mut poses, mut entries } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
@@ -103,8 +109,8 @@ impl Device {
         let (ends, entries) = (self.ends.ends(), &mut entries[active]);
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
-        let (collisions, count) = writer.finish()?;
-        Ok((SentSums { velocities, collisions, poses }, count))
+        let written = writer.finish()?;
+        Ok((Some(SentSums { velocities, collisions: written.sum, poses }), written))
     }
 }
 

@@ -82,14 +82,15 @@ pub enum OrderChoice {
 pub struct StepReport {
     /// Number of bodies.
     pub bodies: u64,
-    /// Number of collisions.
+    /// Number of collisions with contact points.
     pub collisions: u64,
     /// The order in which the collisions were sent. [`Order::HazardFree`] where
     /// [`Order::HazardFreeNearby`] gave way to it ([`Orderer::made`](crate::order::Orderer::made)).
     pub order: Order,
     /// The reason for this order.
     pub order_choice: OrderChoice,
-    /// Empty entries between the collisions, sent as collisions without contact points.
+    /// Empty entries between the collisions, sent as collisions without contact points: the entries
+    /// that the order added, and in the order as given the caller's own collisions of count 0.
     pub empty: u64,
     /// The proof of the order, if it was to be [verified](crate::StepParameters::verify_order): no
     /// hazards, the number of bodies alive at once, and the length of their lives.

@@ -119,17 +119,17 @@ impl Accelerator {
         let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
         let (sent, written) =
             device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
-        plan.collisions = written;
+        plan.collisions = if sent.is_some() { written.collisions } else { 0 };
         host.pack = watch.lap();
         Ok(self.keep(PackedStep {
             id: UniqueId::new(),
             bank,
             plan,
-            sent: Some(sent),
+            sent,
             parameters: *parameters,
-            bodies: bodies.len(),
-            collisions: written,
-            empty: 0,
+            bodies: plan.bodies,
+            collisions: written.collisions - written.paddings,
+            empty: if sent.is_some() { written.paddings } else { 0 },
             order_summary: OrderSummary::as_given(OrderChoice::Asked),
             shapes_loaded: self.shapes_loaded,
             host,

@@ -11,10 +11,6 @@ use pgs_interface::record::CONTACT_POINTS;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// There are no bodies.
-    #[error("a step needs at least one body, found none: give all bodies, static ones included")]
-    NoBodies,
-
     /// The input exceeds this bitstream; another may take it.
     #[error("{excess} ({capable})")]
     BeyondBitstream {
@@ -191,10 +187,10 @@ pub enum InputError {
         body_b: u32,
     },
 
-    /// The number of contact points is not within 1 to [`CONTACT_POINTS`].
+    /// The number of contact points is above [`CONTACT_POINTS`].
     #[error(
-        "collision {collision}: its count is {found}, expected 1 to {CONTACT_POINTS} contact \
-         points: remove the collision if there are none, reduce them if there are more"
+        "collision {collision}: its count is {found}, expected at most {CONTACT_POINTS} contact \
+         points: reduce them"
     )]
     ContactCount {
         /// The collision.
@@ -290,8 +286,8 @@ pub enum InputError {
 
     /// The shape table is empty.
     #[error(
-        "found no shapes, expected at least one: a step needs a body, and a body a shape; set the \
-         shapes that the bodies refer to"
+        "found no shapes, expected at least one: a body needs a shape; set the shapes that the \
+         bodies refer to"
     )]
     NoShapes,
 

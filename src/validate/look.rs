@@ -96,8 +96,9 @@ impl<const REACHES: bool> Look<REACHES> {
         }
     }
 
-    /// Whether validation accepts every collision of the block, and how many look like padding. The
-    /// look has taken all of them at these `locations`, with their bodies looked up in `ends`.
+    /// Whether validation accepts every collision of the block, and how many are padding. The look
+    /// has taken all of them at these `locations`, with their bodies looked up in `ends`, and has
+    /// taken [`Collision::NOTHING`] for padding.
     #[inline(always)]
     pub(crate) fn good<'b, L: CollisionSource<'b>, E: Lookup<'b>>(
         self,
@@ -114,7 +115,7 @@ impl<const REACHES: bool> Look<REACHES> {
             & !End::any_shapeless(self.tags)
             & (wrong >> 31 == 0);
         let mut paddings = 0;
-        if !good && block.scheduled {
+        if !good {
             // Padding counts as wrong above.
             (good, paddings) = quick.heads(block);
         }

@@ -107,6 +107,9 @@ impl Limits {
 
 /// Checks the whole input of a step.
 ///
+/// Of a collision of count 0 nothing else is looked at. A step without bodies needs no shapes, and
+/// fits every board.
+///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
 pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
@@ -150,8 +153,10 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     let needs =
         SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
     check_parameters(parameters, &needs, limits)?;
-    check_room(&needs, limits)?;
-    check_shapes(shapes, &needs, limits)?;
+    if needs.bodies > 0 {
+        check_room(&needs, limits)?;
+        check_shapes(shapes, &needs, limits)?;
+    }
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
     let StepParameters { kinematic, pair_friction, .. } = *parameters;
@@ -167,6 +172,9 @@ fn check_whole<'a>(
     end: impl Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
+    if collision.is_empty() {
+        return Ok(());
+    }
     let (body_a, body_b) =
         check_collision(index, collision, scene.needs.bodies, scene.pair_friction)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
@@ -207,9 +215,6 @@ pub(crate) struct Scene<'a> {
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     let SceneNeeds { bodies, collisions, .. } = *needs;
-    if bodies == 0 {
-        return Err(InputError::NoBodies);
-    }
     let refuse = |excess| Err(needs.refuse(excess, |_| true));
     let limit = limits.body_capacity;
     if exceeds(bodies, limit) {
@@ -354,8 +359,33 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_step_without_bodies_is_refused() {
-        assert_eq!(validated(&[], &[]), Err(InputError::NoBodies));
+    fn a_step_without_bodies_has_empty_collisions_alone() {
+        let empty = Collision { count: 0, ..collision(0, 1) };
+        assert_eq!(validated(&[], &[]), Ok(()));
+        assert_eq!(validated(&[], &[empty; 3]), Ok(()));
+        let refused = InputError::BodyIndex { collision: 1, side: 'A', found: 0, bodies: 0 };
+        assert_eq!(validated(&[], &[empty, collision(0, 1)]), Err(refused));
+        // Nothing is sent, so that nothing has to fit.
+        let none = Limits { body_capacity: 0, collision_capacity: 0, memory_bytes: 0, ..FLOAT };
+        let parameters = StepParameters::default();
+        assert_eq!(validate(&[][..], &[empty][..], &[], &parameters, &none), Ok(()));
+        // The parameters are checked as ever.
+        let parameters = StepParameters { time_step: 0.0, ..parameters };
+        assert!(validate(&[][..], &[][..], &SHAPES, &parameters, &FLOAT).is_err());
+    }
+
+    #[test]
+    fn of_an_empty_collision_nothing_else_is_looked_at() {
+        let nan = Contact { point: [f32::NAN; 3], distance: f32::NAN };
+        let normal = [f32::NAN, f32::INFINITY, 0.0];
+        let bodies = [body(0), body(1), body(0)];
+        for (body_a, body_b) in [(0, 1), (1, 1), (0, 2), (3, 0), (u32::MAX, u32::MAX)] {
+            let empty = Collision { body_a, body_b, normal, count: 0, contacts: [nan; 4] };
+            assert_eq!(validated(&bodies, &[empty]), Ok(()));
+            // Its place counts.
+            let refused = InputError::SelfCollision { collision: 1, body: 1 };
+            assert_eq!(validated(&bodies, &[empty, collision(1, 1)]), Err(refused));
+        }
     }
 
     #[test]
@@ -510,7 +540,7 @@ pub(crate) mod tests {
         let length = text(InputError::NormalLength { collision: 12, length: 1.25 });
         assert!(length.contains("12") && length.contains("1.25") && length.contains("0.001"));
         let count = text(InputError::ContactCount { collision: 12, found: 7 });
-        assert!(count.contains("12") && count.contains('7') && count.contains("1 to 4"));
+        assert!(count.contains("12") && count.contains('7') && count.contains("at most 4"));
         let passes = text(InputError::TooManyIterations { solver: "friction", found: 300 });
         assert!(passes.contains("300") && passes.contains("friction") && passes.contains("255"));
         let orientation = text(InputError::Orientation { body: 3, length: 0.0 });

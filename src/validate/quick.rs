@@ -139,19 +139,18 @@ impl<'a> Quick<'a> {
             let reach = Reach::new(&locations, collision.count);
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let shapes = ends.map(|end| end.shape(self.scene.shapes));
-            surely_fit(&reach, shapes, self.scene.flush_subnormals)
-                | (block.scheduled & is_padding(collision))
+            surely_fit(&reach, shapes, self.scene.flush_subnormals) | collision.is_empty()
         })
     }
 
     /// Whether normals, counts and bodies of all collisions in a block but padding are surely
-    /// right, and how many collisions look like padding.
+    /// right, and how many collisions are padding.
     // Not inlined: most blocks have no padding.
     #[inline(never)]
     pub(crate) fn heads<'b, L: CollisionSource<'b>>(&self, block: &Block<'b, L>) -> (bool, usize) {
         let (mut good, mut paddings) = (true, 0);
         for collision in block.collisions.iter() {
-            let padding = is_padding(collision);
+            let padding = collision.is_empty();
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let points =
                 if self.scene.pair_friction { collision.points() } else { collision.count };
@@ -180,12 +179,9 @@ impl<'a> Quick<'a> {
             let end = u32::try_from(body).map_or(&End::MISSING, |body| block.ends.get(body));
             (end.position, end.shape(self.scene.shapes))
         };
-        (block.first..).zip(block.collisions.iter()).try_for_each(|(index, collision)| {
-            if block.scheduled & is_padding(collision) {
-                return Ok(());
-            }
-            check_whole(index, collision, end, &self.scene)
-        })
+        (block.first..)
+            .zip(block.collisions.iter())
+            .try_for_each(|(index, collision)| check_whole(index, collision, end, &self.scene))
     }
 }
 
@@ -196,9 +192,6 @@ pub(crate) struct Block<'a, L> {
     pub(crate) collisions: L,
     /// The ends of all bodies.
     pub(crate) ends: Ends<'a>,
-    /// Whether the collisions are in the order of a schedule. A collision that looks like padding
-    /// may come from the schedule then. The caller counts such collisions over all blocks.
-    pub(crate) scheduled: bool,
 }
 
 /// Whether normal, count and bodies of a collision are surely right.
@@ -212,10 +205,4 @@ fn head(collision: &Collision, points: u32, [a, b]: [&End; 2]) -> bool {
         & a.has_shape()
         & b.has_shape()
         & !(a.is_static() & b.is_static())
-}
-
-/// Whether a collision looks like padding of a schedule.
-#[inline(always)]
-fn is_padding(collision: &Collision) -> bool {
-    (collision.count == 0) & (collision.body_a == collision.body_b)
 }

@@ -13,6 +13,7 @@ mod vectors;
 mod board_text;
 mod cheapest_order;
 mod check;
+mod empty;
 mod extensions;
 mod float_environment;
 mod interface;

@@ -34,47 +34,49 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) words: Option<&'a [[u32; 2]]>,
 }
 
-/// Writes the records of collisions; the sum of the words written, modulo 2^32, and whether
-/// validation accepts all of them.
+/// Writes the records of collisions; the sum of the words written, modulo 2^32, whether validation
+/// accepts all of them, and how many are padding. A collision without contact points is written as
+/// padding.
 ///
 /// A body that does not exist has a position of zeros, and a body without a shape is static. Where
 /// indices are sent in sixteen bits, their lower halves count. If sixteen bits do not name all
 /// bodies, the packer writes nothing and refuses every collision.
 ///
 /// A caller's [`Collisions`] may answer differently from one read to the next. The check applies to
-/// the collisions as written. The number of collisions that look like padding must be the number of
-/// entries that the order added.
+/// the collisions as written. With an order, the number of paddings must be the number of entries
+/// that the order added: it has left out the caller's collisions without contact points.
 pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
     channels: &mut [&mut [Beat]],
     packers: &mut PackPool,
-) -> (u32, bool) {
+) -> (u32, Seen) {
     let layout = Segment::Collisions.layout(target.variant);
-    let (mut sum, mut good, mut paddings) = (0_u32, true, 0);
+    let (mut sum, mut seen) = (0_u32, Seen::NOTHING);
     let channels = whole(channels);
     let cut = |size| {
         let mut pieces = ChannelChunks::new(&layout, size, channels);
         ranges(entries.count, size).map(move |range| (range, pieces.cut()))
     };
     let work = |part: (Range<usize>, Piece<'_>)| pack_range(target, ends, entries, part);
-    packers.each(entries.count, cut, work, |(of_range, seen): (u32, Seen)| {
+    packers.each(entries.count, cut, work, |(of_range, also): (u32, Seen)| {
         sum = sum.wrapping_add(of_range);
-        good &= seen.good;
-        paddings += seen.paddings;
+        seen = seen.and(also);
     });
-    let as_many = target.quick.is_none() || entries.added.is_none_or(|added| added == paddings);
-    (sum, good & as_many)
+    let as_many =
+        target.quick.is_none() || entries.added.is_none_or(|added| added == seen.paddings);
+    seen.good &= as_many;
+    (sum, seen)
 }
 
 /// The result of the checks of collisions.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Seen {
     /// Whether validation accepts all of them.
     pub(crate) good: bool,
-    /// The number that look like padding, where an order may have added some.
-    paddings: usize,
+    /// The number of paddings; 0 without checks.
+    pub(crate) paddings: usize,
 }
 
 impl Seen {
@@ -101,9 +103,8 @@ fn pack_range<C: Collisions + ?Sized>(
     entries: &Entries<'_, C>,
     (range, mut channels): (Range<usize>, Piece<'_>),
 ) -> (u32, Seen) {
-    let Entries { collisions, count, added, words } = *entries;
-    let marks = Marks { scheduled: added.is_some(), words };
-    let mut packer = CollisionPacker::new(target, ends, marks, range.start, &mut channels);
+    let Entries { collisions, count, words, .. } = *entries;
+    let mut packer = CollisionPacker::new(target, ends, words, range.start, &mut channels);
     let seen = match collisions.structures().filter(|all| all.len() == count) {
         Some(Structures::Array(all)) => packer.write(Contiguous(all).part(range)),
         Some(Structures::Ordered { all, order }) => {
@@ -132,22 +133,14 @@ fn pack_range<C: Collisions + ?Sized>(
     (packer.finish(), seen)
 }
 
-/// Properties of collisions that their own values do not tell.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Marks<'a> {
-    /// Whether they are in an order that was made for them, which may have added entries.
-    pub(crate) scheduled: bool,
-    /// As in [`Entries`].
-    pub(crate) words: Option<&'a [[u32; 2]]>,
-}
-
 /// Writes collisions that lie in memory.
 ///
 /// It is independent of the caller's container, so that it is compiled once, with the driver.
 pub(crate) struct CollisionPacker<'a, 'b> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
-    marks: Marks<'a>,
+    /// As in [`Entries`].
+    words: Option<&'a [[u32; 2]]>,
     dealer: StripeWriter<'a, 'b>,
     geometry: Geometry,
     /// The index of the next collision.
@@ -166,14 +159,14 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     pub(crate) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
-        marks: Marks<'a>,
+        words: Option<&'a [[u32; 2]]>,
         first: usize,
         channels: &'a mut [&'b mut [Beat]],
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
         let geometry = target.variant.profile.geometry;
         let dealer = StripeWriter::new(&layout, channels);
-        Self { quick: target.quick, ends, marks, dealer, geometry, next: first, most_full: true }
+        Self { quick: target.quick, ends, words, dealer, geometry, next: first, most_full: true }
     }
 
     /// As before, but few of the first collisions are expected to have all contact points.
@@ -200,26 +193,20 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 
     #[inline(always)]
     fn write_lying<'p, L: CollisionSource<'p>>(&'p mut self, collisions: L) -> Seen {
-        let Self { quick, ends, marks, dealer, geometry, next, most_full } = self;
-        let Marks { scheduled, words } = *marks;
+        let Self { quick, ends, words, dealer, geometry, next, most_full } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
-        let all = Block { first, collisions, ends: *ends, scheduled };
+        let all = Block { first, collisions, ends: *ends };
         macro_rules! writing {
             ($kind:expr) => {
                 Writing { kind: $kind, rows: PhantomData, quick, all, dealer, most_full }
             };
         }
-        match (*geometry, words) {
+        match (*geometry, *words) {
             (Geometry::Absolute, _) => in_wide_vectors(writing!(Absolute)),
             (Geometry::Relative, None) => in_wide_vectors(writing!(Relative)),
             (Geometry::Relative, Some(words)) => in_wide_vectors(writing!(Worded(words))),
         }
-    }
-
-    /// The index of the next collision.
-    pub(crate) const fn next(&self) -> usize {
-        self.next
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.

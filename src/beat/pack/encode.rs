@@ -231,7 +231,7 @@ impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MO
     Encoding<K, L, E, Look<REACHES>, MOST_FULL>
 {
     /// Whether validation accepts the whole block, whose records must all be made before the call;
-    /// and the number of collisions that look like padding, if the block is scheduled.
+    /// and the number of collisions that are padding.
     #[inline(always)]
     pub(crate) fn good<const ROWS: usize>(
         self,

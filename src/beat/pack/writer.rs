@@ -5,7 +5,7 @@ use std::fmt;
 use pgs_interface::record::Beat;
 use pgs_support::float_env::standard;
 
-use super::collisions::{CollisionPacker, Marks};
+use super::collisions::{CollisionPacker, Seen};
 use super::stripe_writer::BLOCK;
 use super::target::Target;
 use crate::record::body_table::Ends;
@@ -20,12 +20,27 @@ use crate::validate::{Block, Quick};
 pub struct Writer<'a> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
-    packer: CollisionPacker<'a, 'a>,
+    /// `None` for a step without bodies, which has no records.
+    packer: Option<CollisionPacker<'a, 'a>>,
+    /// Collisions that were looked at, and whose records are made.
+    done: usize,
+    /// Those among them that are padding.
+    paddings: usize,
     /// Collisions whose records are not made yet.
     block: [Collision; BLOCK],
     held: usize,
     room: usize,
     refused: Option<InputError>,
+}
+
+/// The collisions that a writer has written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Written {
+    /// The sum of the words written, modulo 2^32.
+    pub(crate) sum: u32,
+    pub(crate) collisions: usize,
+    /// The collisions among them without contact points.
+    pub(crate) paddings: usize,
 }
 
 impl fmt::Debug for Writer<'_> {
@@ -50,11 +65,19 @@ impl<'a> Writer<'a> {
         room: usize,
         channels: &'a mut [&'a mut [Beat]],
     ) -> Self {
-        let marks = Marks { scheduled: false, words: None };
+        let packer = CollisionPacker::new(target, ends, None, 0, channels);
+        Self { packer: Some(packer), ..Self::without_bodies(target, ends, room) }
+    }
+
+    /// As [`Self::new`], for a step without bodies. All of its collisions must be without contact
+    /// points.
+    pub(crate) fn without_bodies(target: Target<'a>, ends: Ends<'a>, room: usize) -> Self {
         Self {
             quick: target.quick,
             ends,
-            packer: CollisionPacker::new(target, ends, marks, 0, channels),
+            packer: None,
+            done: 0,
+            paddings: 0,
             block: [Collision::NOTHING; BLOCK],
             held: 0,
             room,
@@ -62,7 +85,8 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes the next collision. Its index is the value of [`Self::len`] before the call.
+    /// Writes the next collision. Its index is the value of [`Self::len`] before the call. A
+    /// collision of count 0 has an index, too, and is sent as padding.
     ///
     /// Validation follows a little later, and its error comes when all collisions are written. Once
     /// [`Self::is_refused`], the writer drops every further collision, and the length stands still.
@@ -86,7 +110,7 @@ impl<'a> Writer<'a> {
     /// Number of collisions written so far.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.packer.next() + self.held
+        self.done + self.held
     }
 
     /// Whether there are none so far.
@@ -120,29 +144,38 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let (first, collisions) = (self.packer.next(), Contiguous(&self.block[..count]));
-        if !self.packer.write(collisions).good {
-            let ends = self.ends;
-            let block = Block { first, collisions, ends, scheduled: false };
+        let (first, collisions) = (self.done, Contiguous(&self.block[..count]));
+        let seen = match &mut self.packer {
+            Some(packer) => packer.write(collisions),
+            None => {
+                let good = self.block[..count].iter().all(Collision::is_empty);
+                Seen { good, paddings: count }
+            }
+        };
+        self.done += count;
+        self.paddings += seen.paddings;
+        if !seen.good {
+            let block = Block { first, collisions, ends: self.ends };
             let found = self.quick.and_then(|quick| quick.refusal(&block).err());
             // A block that was not written is never sent.
             self.refused = Some(found.unwrap_or(InputError::Unsteady));
         }
     }
 
-    /// Ends the segment; the sum of the words written, modulo 2^32, and the number of collisions.
+    /// Ends the segment.
     ///
     /// # Errors
     /// The refusal of the first wrong collision by validation; [`InputError::MoreThanAnnounced`];
     /// [`InputError::Unsteady`] if collisions were not written although nothing is wrong with them,
     /// which the driver's limits on bodies rule out.
-    pub(crate) fn finish(mut self) -> Result<(u32, usize), InputError> {
+    pub(crate) fn finish(mut self) -> Result<Written, InputError> {
         self.flush();
         match self.refused {
             Some(refused) => Err(refused),
             None => {
-                let written = self.packer.next();
-                Ok((self.packer.finish(), written))
+                let Self { done: collisions, paddings, packer, .. } = self;
+                let sum = packer.map_or(0, CollisionPacker::finish);
+                Ok(Written { sum, collisions, paddings })
             }
         }
     }
@@ -196,7 +229,7 @@ mod tests {
                 list.iter().for_each(|collision| writer.push(collision));
                 let finished = writer.finish();
                 let expected = if fits { Ok(BLOCK) } else { Err(InputError::Unsteady) };
-                assert_eq!(finished.map(|(_, written)| written), expected, "{count}");
+                assert_eq!(finished.map(|written| written.collisions), expected, "{count}");
             }
         }
     }

@@ -624,9 +624,9 @@ fn more_bodies_than_a_stream_has_indices_for_are_refused() {
             std::array::from_fn(|channel| vec![ones; layout.beats_on_channel(BLOCK, channel)]);
         let mut views = buffers.each_mut().map(Vec::as_mut_slice);
         let packers = &mut PackPool::alone();
-        let (_, good) =
+        let (_, seen) =
             pack_collisions(target(&HALF_SPEC), ends.ends(), &entries, &mut views, packers);
-        assert_eq!(good, fits, "{count}");
+        assert_eq!(seen.good, fits, "{count}");
         let untouched = buffers.iter().flatten().filter(|beat| **beat == ones).count();
         assert_eq!(untouched, if fits { 0 } else { layout.beats(BLOCK) }, "{count}");
     }

@@ -183,8 +183,9 @@ impl Input {
         let count = collisions.len();
         let entries = Entries { collisions, count, added: None, words: self.words.as_deref() };
         let mut records = self.buffers(Segment::Collisions, count);
-        let seen = pack_collisions(target, ends, &entries, &mut views(&mut records), packers);
-        (records, seen)
+        let (sum, seen) =
+            pack_collisions(target, ends, &entries, &mut views(&mut records), packers);
+        (records, (sum, seen.good))
     }
 
     /// The buffers are full of ones, so that a missing beat shows.

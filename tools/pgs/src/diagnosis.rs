@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn refused_input_has_no_document() {
-        let error = Error::Input(zynq_pgs::InputError::NoBodies);
+        let error = Error::Input(zynq_pgs::InputError::NoShapes);
         assert_eq!(to_json(&error), Value::Null);
         assert_eq!(to_json(&Error::MustReopen), Value::Null);
     }

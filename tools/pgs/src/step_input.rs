@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use thiserror::Error;
-use zynq_pgs::{Excess, InputError, InputItem, OutOfRange};
+use zynq_pgs::{Accelerator, Excess, InputError, InputItem, OutOfRange, Shape};
 
 use crate::failure::Failure;
 use step_folder::folder::{
@@ -14,14 +14,17 @@ use step_folder::folder::{
 
 /// Loads the step in a folder named on the command line.
 pub(crate) fn load(path: &Path) -> Result<Folder, Failure> {
-    let folder = Folder::load(path).map_err(|error| {
+    Folder::load(path).map_err(|error| {
         Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
-    })?;
-    if folder.bodies.is_empty() {
-        // Checked first: without bodies there are no shapes, no indices and no board.
-        return Err(Failure::input(locate(InputError::NoBodies.into(), &folder)));
-    }
-    Ok(folder)
+    })
+}
+
+/// Loads the shapes of a scene. One without bodies has none, and needs none.
+pub(crate) fn set_shapes(
+    accelerator: &mut Accelerator,
+    shapes: &[Shape],
+) -> Result<(), zynq_pgs::Error> {
+    if shapes.is_empty() { Ok(()) } else { accelerator.set_shapes(shapes) }
 }
 
 /// Input that the driver refused, with the file that holds it.
@@ -87,7 +90,7 @@ fn file_of(error: &InputError) -> &'static str {
         InputError::ContactNotFinite { .. } => COLLISION_POINTS,
         InputError::Parameter { .. } => PARAMS,
         InputError::TooManyIterations { .. } => ITERATIONS,
-        // No bodies, and errors of later versions of the driver.
+        // Errors of later versions of the driver.
         _ => BODY_POSITION,
     }
 }

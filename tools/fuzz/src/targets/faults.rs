@@ -151,11 +151,16 @@ fn open_faulty(input: &mut Input<'_>, board: &EmulatedBoard, config: &BoardConfi
 }
 
 impl Run {
-    /// Opens a board, and takes a step on it without faults; none if that step fails by its input.
+    /// Opens a board, and takes a step on it without faults; none if that step fails by its input,
+    /// or has no bodies.
     fn new(input: &mut Input<'_>, board: &EmulatedBoard) -> Option<Self> {
         let port = board.cpu_port();
         let mut accelerator = open(&port).expect("nothing is wrong with the board");
         let scene = Scene::any(input, 8, 8, InvalidValues::Never);
+        if scene.bodies.is_empty() {
+            // Such a step does not reach the board.
+            return None;
+        }
         accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
         let mut parameters = parameters(input, 3, InvalidValues::Never);
         // With hazards, the result of a pipeline that does not wait depends on the arrival of

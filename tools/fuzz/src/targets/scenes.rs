@@ -120,6 +120,13 @@ fn collision(
         count: 1 + input.below(4),
         contacts: [0, 1, 2, 3].map(contact),
     };
+    if input.one_in(16) {
+        // Nothing else of an empty collision matters.
+        let normal = [(); 3].map(|()| f32::from_bits(input.word()));
+        let [body_a, body_b] =
+            [body_a, body_b].map(|body| if input.one_in(2) { body } else { input.telling_word() });
+        return Collision { body_a, body_b, normal, count: 0, ..collision };
+    }
     if wild(input) {
         match input.below(5) {
             0 => collision.body_a = input.telling_word(),

@@ -52,16 +52,17 @@ frame:
   body_inv_mass     (N) <f4        1/mass; 0 is a static body, whose velocities and inverse inertia are 0
   body_inv_inertia  (N, 3) <f4     inverse inertia about the body's own axes x, y, z
   contact_bodies    (M, 2) <u4     indices of bodies A and B, from 0
-  contact_npoints   (M) <u4        contact points of each collision, 1 to 4
+  contact_npoints   (M) <u4        contact points of each collision, 0 to 4
   contact_normal    (M, 3) <f4     unit normal, which points from B to A
   contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
                                    whose surface is at point + d * normal; negative for penetration.
                                    Only the first contact_npoints of the four are read
 
-A step needs at least one body. One without collisions has contact arrays of M = 0; an array
-without rows may also have shape (0,) and any type, as numpy.array([]) has. With position drift 0
-and a position coefficient equal to the time step, a distance is a velocity in m/s: a negative one
-is the least speed of separation, and a positive one the greatest speed of approach.
+A collision of 0 points is empty: it has no effect, and none of its other values matters. A step
+without bodies or collisions has arrays of N = 0 or M = 0; an array without rows may also have
+shape (0,) and any type, as numpy.array([]) has. With position drift 0 and a position coefficient
+equal to the time step, a distance is a velocity in m/s: a negative one is the least speed of
+separation, and a positive one the greatest speed of approach.
 
 --no-integrate leaves the rest of a step to the caller: forces and gravity, damping, gyroscopic
 terms, motion. Poses stay unchanged.
@@ -156,9 +157,7 @@ pub(crate) fn run(
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
-    let stepped = opened
-        .accelerator
-        .set_shapes(&folder.shapes)
+    let stepped = step_input::set_shapes(&mut opened.accelerator, &folder.shapes)
         .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters));
     if stepped.is_ok() {
         opened.alive()?;

@@ -123,7 +123,7 @@ impl<'a> Side<'a> {
         let begin = || {
             let mut opened = board::open(&common, &spec.build)?;
             let world = world(&opened)?;
-            if let Err(error) = opened.accelerator.set_shapes(world.shapes()) {
+            if let Err(error) = step_input::set_shapes(&mut opened.accelerator, world.shapes()) {
                 return Err(failure(&opened, &world, error));
             }
             Ok((opened, world))

@@ -65,10 +65,12 @@ pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision
         let count = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS);
         count.min(CONTACT_POINTS)
     };
+    // Nothing of an empty collision is streamed.
+    let given = || collisions.iter().filter(|collision| collision.count > 0);
     let of_pairs = |name, part, of: &dyn Fn(&Collision) -> Vec<f32>| Numbers {
         name,
         part,
-        values: collisions.iter().flat_map(of).filter(|value| !value.is_nan()).collect(),
+        values: given().flat_map(of).filter(|value| !value.is_nan()).collect(),
     };
     let points = |collision: &Collision, of: &dyn Fn([f32; 3]) -> [f32; 3]| -> Vec<f32> {
         collision.contacts[..used(collision)].iter().flat_map(|c| of(c.point)).collect()
