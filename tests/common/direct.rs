@@ -251,7 +251,8 @@ pub(crate) fn direct_step(
     ];
     for (count, pass) in passes {
         for _ in 0..count {
-            for (collision, impulses) in collisions.iter().zip(&mut impulses) {
+            let given = collisions.iter().zip(&mut impulses);
+            for (collision, impulses) in given.filter(|(collision, _)| !collision.is_empty()) {
                 let [at_a, at_b] = [collision.body_a, collision.body_b].map(|at| at as usize);
                 let (mut a, mut b) = (moving[at_a], moving[at_b]);
                 pass(collision, &mut a, &mut b, impulses, parameters);

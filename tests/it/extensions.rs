@@ -93,6 +93,9 @@ fn each_pair_has_its_own_friction() {
     for (number, collision) in (0_u16..).zip(&mut collisions) {
         *collision = collision.with_friction(f32::from(number % 9) * 0.15);
     }
+    // A friction does not give a collision a contact point.
+    let empty = Collision { count: 0, body_b: u32::MAX, ..collisions[5] }.with_friction(0.5);
+    collisions.insert(6, empty);
     let mut parameters = ordered(Order::AsGiven);
     parameters.pair_friction = true;
     for shapes in both_inertias() {

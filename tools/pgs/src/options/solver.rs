@@ -6,7 +6,7 @@ use bitstream_model::interface::control::ITERATIONS_MAX;
 use clap::Args;
 use zynq_pgs::StepParameters;
 
-/// Iterations and time step, in place of the verb's or the folder's own.
+/// Iterations, time step and spin damping, in place of the verb's or the folder's own.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 #[command(next_help_heading = "Solver")]
 pub(crate) struct SolverArgs {
@@ -19,10 +19,14 @@ pub(crate) struct SolverArgs {
     /// Time step, s: a number, or a fraction as 1/60
     #[arg(long, value_name = "S", value_parser = time_step)]
     dt: Option<f32>,
+    /// Share of the spin about the normal that each friction pass takes away, 0 to 1: 0 is off, 0.1 is
+    /// Bullet's
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    spin_damping: Option<f32>,
 }
 
 impl SolverArgs {
-    /// Sets the iterations and the time step.
+    /// Sets the parameters that are given.
     pub(crate) fn apply(self, mut parameters: StepParameters) -> StepParameters {
         if let Some(iterations) = self.contact_iterations {
             parameters.contact_iterations = iterations;
@@ -32,6 +36,9 @@ impl SolverArgs {
         }
         if let Some(time_step) = self.dt {
             parameters.time_step = time_step;
+        }
+        if let Some(share) = self.spin_damping {
+            parameters.spin_damping = share;
         }
         parameters
     }
@@ -58,6 +65,14 @@ impl DeadlineArgs {
 
 fn iterations() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(..=i64::from(ITERATIONS_MAX))
+}
+
+/// Parses a share.
+fn share(text: &str) -> Result<f32, String> {
+    match text.trim().parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 to 1".to_owned()),
+    }
 }
 
 /// Longest time step, s. A longer one is a typing error.
@@ -109,10 +124,15 @@ mod tests {
     fn what_is_not_given_stays() {
         let own = StepParameters::default();
         assert_eq!(SolverArgs::default().apply(own), own);
-        let given =
-            SolverArgs { contact_iterations: Some(7), friction_iterations: Some(0), dt: Some(0.5) };
+        let given = SolverArgs {
+            contact_iterations: Some(7),
+            friction_iterations: Some(0),
+            dt: Some(0.5),
+            spin_damping: Some(0.0),
+        };
         let applied = given.apply(own);
         assert_eq!((applied.contact_iterations, applied.friction_iterations), (7, 0));
         assert_eq!(applied.time_step.to_bits(), 0.5_f32.to_bits());
+        assert_eq!(applied.spin_damping.to_bits(), 0.0_f32.to_bits());
     }
 }

@@ -100,6 +100,15 @@ fn a_pile_comes_to_rest_without_energy() {
 }
 
 #[test]
+fn the_spin_damping_is_that_of_the_command_line() {
+    let of = |options: &str| document(&format!("--grid 3x3x3 --steps 40 --seed 5 {options}"));
+    let (own, bullet, off) = (of(""), of("--spin-damping 0.1"), of("--spin-damping 0"));
+    assert_eq!(own["digest"], bullet["digest"]);
+    assert_ne!(own["digest"], off["digest"]);
+    assert_eq!(off["config"]["spin_damping"], 0.0);
+}
+
+#[test]
 fn iterations_and_time_step_are_those_of_the_command_line() {
     let options =
         "--grid 2x2x2 --steps 2 --contact-iterations 3 --friction-iterations 2 --dt 1/120";
@@ -110,7 +119,14 @@ fn iterations_and_time_step_are_those_of_the_command_line() {
     let fall = 8.0 * 9.8_f64.powi(2) * (2.0 / 120.0_f64).powi(2) / 2.0;
     let energy = document["steps"][1]["kinetic_energy_j"].as_f64().expect("a number");
     assert!((energy - fall).abs() < 1e-4, "{energy} J of {fall}");
-    for wrong in ["--dt 0", "--dt 1/0", "--contact-iterations 256", "--friction-iterations -1"] {
+    let wrong = [
+        "--dt 0",
+        "--dt 1/0",
+        "--contact-iterations 256",
+        "--friction-iterations -1",
+        "--spin-damping 2",
+    ];
+    for wrong in wrong {
         assert_eq!(run(["run"].into_iter().chain(wrong.split(' '))).code, Some(2), "{wrong}");
     }
 }

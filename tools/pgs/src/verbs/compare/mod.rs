@@ -231,6 +231,7 @@ pub(crate) fn run(
         config["contact_iterations"] = parameters.contact_iterations.into();
         config["friction_iterations"] = parameters.friction_iterations.into();
         config["time_step_s"] = parameters.time_step.into();
+        config["spin_damping"] = parameters.spin_damping.into();
         config["a"] = args.a.to_string().into();
         config["b"] = args.b.to_string().into();
         let document = json!({

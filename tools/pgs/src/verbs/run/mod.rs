@@ -272,6 +272,7 @@ fn document(
     config["contact_iterations"] = parameters.contact_iterations.into();
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
+    config["spin_damping"] = parameters.spin_damping.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
     let summary = summary(args, parameters, opened, scene, &course);
