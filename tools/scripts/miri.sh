@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Runs the driver's buffers and windows with what builds on them, and the threads that share work, under
-# Miri: it finds reads and writes outside an allocation, references that overlap, and data races.
+# Runs the driver's buffers and windows with what builds on them, the threads that share work, and the C
+# interface's access to its caller's memory, under Miri: it finds reads and writes outside an allocation,
+# references that overlap, and data races.
 #
 # Not under Miri: what goes through a device file, as it maps none, the vectors of a processor, and what
 # the emulated board's threads share by themselves. valgrind.sh runs whole steps.
@@ -24,3 +25,5 @@ attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-p
 # The threads that packing, detection and the emulated board share their work among: they outlive what
 # they borrow.
 attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p pgs-support --lib
+# The structures and strided arrays of a C caller.
+attend timeout "${MIRI_LIMIT:-1800}" cargo +nightly miri test --locked -p zynq-pgs-c --lib -- memory::

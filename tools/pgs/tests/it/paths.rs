@@ -98,9 +98,13 @@ fn unsafe_code_is_allowed_only_where_the_page_says() {
         .map(|path| root().join(path))
         .collect();
     let mut files = Vec::new();
-    for folder in
-        ["src", "bitstream-model/src", "bitstream-model/interface", "bitstream-model/support"]
-    {
+    for folder in [
+        "src",
+        "bitstream-model/src",
+        "bitstream-model/interface",
+        "bitstream-model/support",
+        "tools/capi/src",
+    ] {
         rust_files(&root().join(folder), &mut files);
     }
     let mut seen = 0;

@@ -1,0 +1,345 @@
+/* zynq_pgs.h: the C interface of zynq-pgs, driver of an FPGA accelerator for rigid body contacts.
+ *
+ * cbindgen makes this header from tools/capi/src. docs/c.md has the conventions.
+ *
+ * - A call returns a zpgs_status; the words of a failure are in zpgs_last_error.
+ * - A structure that begins with `size` has sizeof of itself there.
+ * - One thread at a time uses an accelerator, but for zpgs_cancel.
+ */
+
+#ifndef ZYNQ_PGS_H
+#define ZYNQ_PGS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+// Largest number of contact points of a collision.
+#define ZPGS_CONTACT_POINTS 4
+
+// Version of the binary interface: the number in the shared library's name. It grows when a
+// program that was built with an older header would no longer work.
+#define ZPGS_ABI_VERSION 0
+
+// How a call ended, and what the caller can do next. A call that did not end in `ZPGS_STATUS_OK`
+// has changed nothing of the caller's, and `zpgs_last_error` has its text.
+typedef enum zpgs_status {
+    // Done.
+    ZPGS_STATUS_OK = 0,
+    // A pointer is null that must not be: a mistake of the program.
+    ZPGS_STATUS_NULL_POINTER = 1,
+    // An argument that the interface itself cannot take: a misaligned pointer, a stride, a size, a
+    // flag, a text that is not UTF-8.
+    ZPGS_STATUS_ARGUMENT = 2,
+    // The driver refused the input before it sent anything: correct the input.
+    ZPGS_STATUS_INPUT = 3,
+    // No board could be opened.
+    ZPGS_STATUS_OPEN = 4,
+    // The step failed, and the board was reset and works again: make the same call again.
+    ZPGS_STATUS_AGAIN = 5,
+    // The step failed, and the same call would fail in the same way. The board works.
+    ZPGS_STATUS_FAILED = 6,
+    // The board could not be reset: close the accelerator and open it again.
+    ZPGS_STATUS_REOPEN = 7,
+    // `zpgs_cancel` ended the step. The board works, and the next step is not cancelled.
+    ZPGS_STATUS_CANCELLED = 8,
+    // The call does not fit: a step is in flight, or none is.
+    ZPGS_STATUS_SEQUENCE = 9,
+    // Another thread is in a call with the same accelerator.
+    ZPGS_STATUS_BUSY = 10,
+    // The library met a mistake of its own: close the accelerator. Every later call with the same
+    // accelerator ends like this, too.
+    ZPGS_STATUS_PANIC = 11,
+} zpgs_status;
+
+// The order in which the board gets the collisions.
+typedef enum zpgs_order {
+    // The cheapest on the board at hand.
+    ZPGS_ORDER_AUTOMATIC = 0,
+    // As the caller gives them.
+    ZPGS_ORDER_AS_GIVEN = 1,
+    // No hazards, collisions near to their given places.
+    ZPGS_ORDER_HAZARD_FREE_NEARBY = 2,
+    // No hazards and few bodies alive.
+    ZPGS_ORDER_HAZARD_FREE = 3,
+    // By colour, no body twice in a colour.
+    ZPGS_ORDER_COLOURS = 4,
+    // Body by body; of equal bodies the one of the lowest index.
+    ZPGS_ORDER_BODY_BY_BODY_LOWEST_INDEX = 5,
+    // Body by body; of equal bodies the one that became active first.
+    ZPGS_ORDER_BODY_BY_BODY_OLDEST = 6,
+    // Body by body; of equal bodies the one that became active last.
+    ZPGS_ORDER_BODY_BY_BODY_NEWEST = 7,
+} zpgs_order;
+
+// An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.
+//
+// One thread at a time may call with it, but for `zpgs_cancel`, which any thread may call. A
+// second call at the same time is refused with `ZPGS_STATUS_BUSY`.
+typedef struct zpgs_accelerator zpgs_accelerator;
+
+// Mass properties that bodies refer to by index.
+typedef struct zpgs_shape {
+    // Inverse mass, 1/kg; 0 is static.
+    float inverse_mass;
+    // Diagonal of the inverse inertia about the body's own axes, 1/(kg m^2). Three unequal numbers
+    // need a bitstream with world inertia.
+    float inverse_inertia[3];
+} zpgs_shape;
+
+// The parameters of a step. `zpgs_parameters_default` fills it in; the caller then changes fields.
+//
+// A flag is 0 for no and 1 for yes.
+typedef struct zpgs_parameters {
+    // Size of the structure, as the caller's header has it: `zpgs_parameters_default` sets it.
+    size_t size;
+    // Time step, s.
+    float time_step;
+    // Penetration that the solver leaves alone, m.
+    float position_drift;
+    // Share of the penetration that a step removes.
+    float position_coefficient;
+    // Friction coefficient of every contact, unless each collision has its own.
+    float friction;
+    // Share of the angular velocity that a step with integration leaves, from 0 to 1.
+    float angular_damping;
+    // Share of the spin about the normal that every friction pass takes, from 0 to 1.
+    float spin_damping;
+    // Gravity, m/s^2, world frame; only a step with integration uses it.
+    float gravity[3];
+    // Passes of the contact solver over all collisions.
+    uint32_t contact_iterations;
+    // Passes of the friction solver over all collisions.
+    uint32_t friction_iterations;
+    // Flag: each collision has a friction of its own (`zpgs_count_with_friction`).
+    uint32_t pair_friction;
+    // Flag: integrate after the solver. Without it the velocities come back as the solver left
+    // them, and the poses stay.
+    uint32_t integrate;
+    // Flag: static bodies may move, by the velocity that they come with.
+    uint32_t kinematic;
+    // Flag: verify before anything is sent that the order has no hazards. For debugging.
+    uint32_t verify_order;
+    // One of `zpgs_order`.
+    uint32_t order;
+    // Time limit of a step on the board, ms; 0 derives it from the work.
+    uint32_t deadline_ms;
+    // Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
+    uint32_t retries;
+} zpgs_parameters;
+
+// An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
+//
+// Address and stride are multiples of 4, and the stride is at least the size of an element. An
+// array of structures has the size of its structure as the stride, a dense array that of its
+// element. `data` may be null if the array has no element.
+typedef struct zpgs_strided {
+    // The first element.
+    void *data;
+    // Bytes from one element to the next.
+    size_t stride;
+} zpgs_strided;
+
+// An array that the library only reads; as `zpgs_strided`.
+typedef struct zpgs_strided_const {
+    // The first element.
+    const void *data;
+    // Bytes from one element to the next.
+    size_t stride;
+} zpgs_strided_const;
+
+// The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
+// frame.
+//
+// During a call no other thread writes the arrays. No two elements share a byte, whether they are
+// of one array or of two.
+typedef struct zpgs_bodies {
+    // Size of the structure, as the caller's header has it.
+    size_t size;
+    // Number of bodies.
+    size_t count;
+    // Centres of mass, m: `float[3]`.
+    struct zpgs_strided positions;
+    // Unit quaternions x, y, z, w: `float[4]`.
+    struct zpgs_strided orientations;
+    // Velocities of the centres of mass, m/s: `float[3]`.
+    struct zpgs_strided linear_velocities;
+    // Angular velocities, rad/s: `float[3]`.
+    struct zpgs_strided angular_velocities;
+    // Indices into the shapes: `uint32_t`.
+    struct zpgs_strided_const shapes;
+} zpgs_bodies;
+
+// The collisions of a step, in the caller's own memory.
+//
+// During a call no thread writes them, and they share no byte with the arrays of the bodies.
+typedef struct zpgs_collisions {
+    // Size of the structure, as the caller's header has it.
+    size_t size;
+    // Number of collisions.
+    size_t count;
+    // The collisions: `zpgs_collision`. A step reads a dense array without a copy.
+    struct zpgs_strided_const collisions;
+} zpgs_collisions;
+
+// Counts and times of one step. The caller sets `size` to `sizeof(zpgs_report)` before the call.
+typedef struct zpgs_report {
+    // Size of the structure, as the caller's header has it.
+    size_t size;
+    // Clock cycles of the board from start to done.
+    uint64_t cycles;
+    // Cycles in which a collision waited for a velocity of an earlier one.
+    uint64_t stalls;
+    // Cycles in which the board waited for memory.
+    uint64_t waits;
+    // Collisions that met a hazard, over all passes.
+    uint64_t hazards;
+    // Time from start to done by the board's clock, s; 0 if the bitstream gives no clock.
+    double seconds;
+    // Sum of the normal impulses after the last contact pass, N s; not a number if the bitstream
+    // does not count it, or not as far.
+    double impulse_sum;
+    // Number of bodies.
+    uint64_t bodies;
+    // Number of collisions with contact points.
+    uint64_t collisions;
+    // Number of repetitions after faults.
+    uint64_t retries;
+} zpgs_report;
+
+// One point at which two bodies touch.
+typedef struct zpgs_contact {
+    // The point on the surface of body B, world frame, m.
+    float point[3];
+    // Signed distance along the normal, m. The surface of body A is at `point + distance *
+    // normal`; negative is penetration.
+    float distance;
+} zpgs_contact;
+
+// Two bodies in contact at one to four points. A collision of count 0 is empty: it has no effect
+// and keeps its index.
+typedef struct zpgs_collision {
+    // Index of body A.
+    uint32_t body_a;
+    // Index of body B.
+    uint32_t body_b;
+    // Unit normal from body B to body A, world frame.
+    float normal[3];
+    // Number of contact points, 0 to `ZPGS_CONTACT_POINTS`. `zpgs_count_with_friction` adds a
+    // friction of the pair.
+    uint32_t count;
+    // The contact points. The elements from `count` on are ignored, but must be initialised.
+    struct zpgs_contact contacts[ZPGS_CONTACT_POINTS];
+} zpgs_collision;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// The version of the library, such as "0.1.0". The text lives as long as the library.
+const char *zpgs_version(void);
+
+// The `ZPGS_ABI_VERSION` of the library.
+uint32_t zpgs_abi_version(void);
+
+// Opens a board.
+//
+// `board` names it: "auto", "uio[:NODE]", "devmem", "emulated[:BUILD]" such as
+// "emulated:float,world", or "socket:PATH". `accelerator` receives the handle, or null where the
+// call fails; `zpgs_last_error` of null then has the text.
+//
+// # Safety
+// `board` is null or a text that ends with a null byte; `accelerator` is null or the address of a
+// pointer.
+enum zpgs_status zpgs_open(const char *board, struct zpgs_accelerator **accelerator);
+
+// Closes an accelerator, and stops a step in flight. Null does nothing.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, is closed once, and no other thread uses it.
+enum zpgs_status zpgs_close(struct zpgs_accelerator *accelerator);
+
+// The text of the last failed call with that accelerator: what was expected, what was found and
+// what to do, with every cause. It stays until another call with the accelerator fails. Empty if
+// none failed.
+//
+// With null: the text of this thread's last failed call without an accelerator (`zpgs_open`, a
+// null handle), or with one that another thread used (`ZPGS_STATUS_BUSY`). It stays until the
+// thread's next call of this kind fails. Never null.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed.
+const char *zpgs_last_error(const struct zpgs_accelerator *accelerator);
+
+// Loads `count` shapes, in place of all earlier ones; bodies refer to them by index. Not while a
+// step is in flight.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed; `shapes` is null or the address of
+// `count` shapes.
+enum zpgs_status zpgs_set_shapes(struct zpgs_accelerator *accelerator,
+                                 const struct zpgs_shape *shapes,
+                                 size_t count);
+
+// Fills in the parameters of a step: Bullet's, at 60 steps a second. `size` is
+// `sizeof(zpgs_parameters)`.
+//
+// # Safety
+// `parameters` is null or the address of `size` bytes.
+enum zpgs_status zpgs_parameters_default(struct zpgs_parameters *parameters, size_t size);
+
+// The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
+// `pair_friction` of `zpgs_parameters`. The sign is dropped.
+uint32_t zpgs_count_with_friction(uint32_t count, float friction);
+
+// Solves the contacts of one time step, and integrates it if the parameters say so. Returns when
+// it is done. The bodies change only if the step succeeds, and then all at once.
+//
+// `report` may be null.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed. Every other pointer is null or the
+// address of its structure, with the size in it; the arrays are as `zpgs_bodies` and
+// `zpgs_collisions` describe.
+enum zpgs_status zpgs_step(struct zpgs_accelerator *accelerator,
+                           const struct zpgs_bodies *bodies,
+                           const struct zpgs_collisions *collisions,
+                           const struct zpgs_parameters *parameters,
+                           struct zpgs_report *report);
+
+// Starts a step and returns at once. The arrays are the caller's again when the call returns. At
+// most one step of an accelerator is in flight; `zpgs_wait` ends it.
+//
+// # Safety
+// As `zpgs_step`.
+enum zpgs_status zpgs_submit(struct zpgs_accelerator *accelerator,
+                             const struct zpgs_bodies *bodies,
+                             const struct zpgs_collisions *collisions,
+                             const struct zpgs_parameters *parameters);
+
+// Waits for the step in flight and stores its results in the bodies, which must be those of
+// `zpgs_submit`; their arrays may have moved. Whether it fails or not, no step is in flight
+// afterwards, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
+// `ZPGS_STATUS_BUSY`.
+//
+// `report` may be null.
+//
+// # Safety
+// As `zpgs_step`.
+enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
+                           const struct zpgs_bodies *bodies,
+                           struct zpgs_report *report);
+
+// Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
+// board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
+// The step after it is not cancelled. Any thread may call it at any time, also during another
+// call.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed.
+enum zpgs_status zpgs_cancel(const struct zpgs_accelerator *accelerator);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* ZYNQ_PGS_H */

@@ -1,0 +1,66 @@
+//! The caller's arrays of bodies and collisions: where each lies, and how far apart its elements
+//! are.
+
+use std::ffi::c_void;
+
+/// An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
+///
+/// Address and stride are multiples of 4, and the stride is at least the size of an element. An
+/// array of structures has the size of its structure as the stride, a dense array that of its
+/// element. `data` may be null if the array has no element.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct Strided {
+    /// The first element.
+    pub data: *mut c_void,
+    /// Bytes from one element to the next.
+    pub stride: usize,
+}
+
+/// An array that the library only reads; as `zpgs_strided`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct StridedConst {
+    /// The first element.
+    pub data: *const c_void,
+    /// Bytes from one element to the next.
+    pub stride: usize,
+}
+
+/// The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
+/// frame.
+///
+/// During a call no other thread writes the arrays. No two elements share a byte, whether they are
+/// of one array or of two.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct BodyArrays {
+    /// Size of the structure, as the caller's header has it.
+    pub size: usize,
+    /// Number of bodies.
+    pub count: usize,
+    /// Centres of mass, m: `float[3]`.
+    pub positions: Strided,
+    /// Unit quaternions x, y, z, w: `float[4]`.
+    pub orientations: Strided,
+    /// Velocities of the centres of mass, m/s: `float[3]`.
+    pub linear_velocities: Strided,
+    /// Angular velocities, rad/s: `float[3]`.
+    pub angular_velocities: Strided,
+    /// Indices into the shapes: `uint32_t`.
+    pub shapes: StridedConst,
+}
+
+/// The collisions of a step, in the caller's own memory.
+///
+/// During a call no thread writes them, and they share no byte with the arrays of the bodies.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct CollisionArray {
+    /// Size of the structure, as the caller's header has it.
+    pub size: usize,
+    /// Number of collisions.
+    pub count: usize,
+    /// The collisions: `zpgs_collision`. A step reads a dense array without a copy.
+    pub collisions: StridedConst,
+}

@@ -1,0 +1,58 @@
+//! Collisions as C has them: the driver's layout, word by word.
+
+use std::mem::offset_of;
+
+/// Largest number of contact points of a collision.
+pub const ZPGS_CONTACT_POINTS: usize = 4;
+
+/// One point at which two bodies touch.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C)]
+pub struct Contact {
+    /// The point on the surface of body B, world frame, m.
+    pub point: [f32; 3],
+    /// Signed distance along the normal, m. The surface of body A is at `point + distance *
+    /// normal`; negative is penetration.
+    pub distance: f32,
+}
+
+/// Two bodies in contact at one to four points. A collision of count 0 is empty: it has no effect
+/// and keeps its index.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C)]
+pub struct Collision {
+    /// Index of body A.
+    pub body_a: u32,
+    /// Index of body B.
+    pub body_b: u32,
+    /// Unit normal from body B to body A, world frame.
+    pub normal: [f32; 3],
+    /// Number of contact points, 0 to `ZPGS_CONTACT_POINTS`. `zpgs_count_with_friction` adds a
+    /// friction of the pair.
+    pub count: u32,
+    /// The contact points. The elements from `count` on are ignored, but must be initialised.
+    pub contacts: [Contact; ZPGS_CONTACT_POINTS],
+}
+
+/// The driver reads the collisions of C where they lie.
+const _: () = {
+    use zynq_pgs::{CONTACT_POINTS, Collision as Driver, Contact as Point};
+    assert!(ZPGS_CONTACT_POINTS == CONTACT_POINTS);
+    assert!(size_of::<Collision>() == size_of::<Driver>());
+    assert!(align_of::<Collision>() == align_of::<Driver>());
+    assert!(offset_of!(Collision, body_a) == offset_of!(Driver, body_a));
+    assert!(offset_of!(Collision, body_b) == offset_of!(Driver, body_b));
+    assert!(offset_of!(Collision, normal) == offset_of!(Driver, normal));
+    assert!(offset_of!(Collision, count) == offset_of!(Driver, count));
+    assert!(offset_of!(Collision, contacts) == offset_of!(Driver, contacts));
+    assert!(size_of::<Contact>() == size_of::<Point>());
+    assert!(offset_of!(Contact, point) == offset_of!(Point, point));
+    assert!(offset_of!(Contact, distance) == offset_of!(Point, distance));
+};
+
+/// The count word of a collision with a friction of its own.
+pub(crate) fn count_with_friction(count: u32, friction: f32) -> u32 {
+    let contacts = [zynq_pgs::Contact::default(); ZPGS_CONTACT_POINTS];
+    let collision = zynq_pgs::Collision { body_a: 0, body_b: 0, normal: [0.0; 3], count, contacts };
+    collision.with_friction(friction).count
+}

@@ -1,0 +1,282 @@
+//! The functions of the header, in its order.
+
+#![allow(unsafe_code, reason = "exported names, and arguments that are raw pointers")]
+
+use std::ffi::{CStr, c_char};
+
+use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
+use crate::barrier::{call, call_with};
+use crate::collision::{Collision, count_with_friction};
+use crate::failure::Failure;
+use crate::handle::AcceleratorHandle;
+use crate::last_error;
+use crate::memory::{self, BodiesView, CollisionsView, Out};
+use crate::parameters::Parameters;
+use crate::report::Report;
+use crate::shape::Shape;
+use crate::status::Status;
+
+/// Version of the binary interface: the number in the shared library's name. It grows when a
+/// program that was built with an older header would no longer work.
+pub const ZPGS_ABI_VERSION: u32 = 0;
+
+const VERSION: &CStr =
+    match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(version) => version,
+        Err(_) => panic!("a version without null bytes"),
+    };
+
+/// The version of the library, such as "0.1.0". The text lives as long as the library.
+#[unsafe(no_mangle)]
+pub extern "C" fn zpgs_version() -> *const c_char {
+    VERSION.as_ptr()
+}
+
+/// The `ZPGS_ABI_VERSION` of the library.
+#[unsafe(no_mangle)]
+pub extern "C" fn zpgs_abi_version() -> u32 {
+    ZPGS_ABI_VERSION
+}
+
+/// Opens a board.
+///
+/// `board` names it: "auto", "uio[:NODE]", "devmem", "emulated[:BUILD]" such as
+/// "emulated:float,world", or "socket:PATH". `accelerator` receives the handle, or null where the
+/// call fails; `zpgs_last_error` of null then has the text.
+///
+/// # Safety
+/// `board` is null or a text that ends with a null byte; `accelerator` is null or the address of a
+/// pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_open(
+    board: *const c_char,
+    accelerator: *mut *mut AcceleratorHandle,
+) -> Status {
+    let open = || {
+        // SAFETY: the caller promises a text.
+        let board = unsafe { memory::text(board, "text that names the board") }?;
+        AcceleratorHandle::open(board)
+    };
+    // SAFETY: the caller promises the address of a pointer.
+    call(|| unsafe { memory::open_into(accelerator, open) })
+}
+
+/// Closes an accelerator, and stops a step in flight. Null does nothing.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, is closed once, and no other thread uses it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_close(accelerator: *mut AcceleratorHandle) -> Status {
+    // SAFETY: the caller promises an open handle that nothing else uses.
+    call(|| unsafe { memory::close(accelerator) })
+}
+
+/// The text of the last failed call with that accelerator: what was expected, what was found and
+/// what to do, with every cause. It stays until another call with the accelerator fails. Empty if
+/// none failed.
+///
+/// With null: the text of this thread's last failed call without an accelerator (`zpgs_open`, a
+/// null handle), or with one that another thread used (`ZPGS_STATUS_BUSY`). It stays until the
+/// thread's next call of this kind fails. Never null.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_last_error(accelerator: *const AcceleratorHandle) -> *const c_char {
+    // SAFETY: the caller promises an open handle.
+    match unsafe { memory::handle(accelerator) } {
+        Ok(handle) => handle.text(),
+        Err(_) => last_error::get(),
+    }
+}
+
+/// Loads `count` shapes, in place of all earlier ones; bodies refer to them by index. Not while a
+/// step is in flight.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed; `shapes` is null or the address of
+/// `count` shapes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_set_shapes(
+    accelerator: *mut AcceleratorHandle,
+    shapes: *const Shape,
+    count: usize,
+) -> Status {
+    // SAFETY: the caller promises an open handle.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the caller promises the shapes; a shape takes every bit pattern.
+        let given = unsafe { memory::slice(shapes, count, "shapes") }?;
+        let mut shapes = Vec::new();
+        shapes.try_reserve_exact(given.len()).map_err(|error| {
+            Failure::argument(format!(
+                "no memory for {count} shapes ({error}): correct their number"
+            ))
+        })?;
+        shapes.extend(given.iter().map(|shape| zynq_pgs::Shape::from(*shape)));
+        Ok(state.idle()?.set_shapes(&shapes)?)
+    })
+}
+
+/// Fills in the parameters of a step: Bullet's, at 60 steps a second. `size` is
+/// `sizeof(zpgs_parameters)`.
+///
+/// # Safety
+/// `parameters` is null or the address of `size` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_parameters_default(
+    parameters: *mut Parameters,
+    size: usize,
+) -> Status {
+    call(|| {
+        // SAFETY: the caller promises the bytes.
+        unsafe { Out::of_size(parameters, size) }?.write(Parameters::default());
+        Ok(())
+    })
+}
+
+/// The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
+/// `pair_friction` of `zpgs_parameters`. The sign is dropped.
+#[unsafe(no_mangle)]
+pub extern "C" fn zpgs_count_with_friction(count: u32, friction: f32) -> u32 {
+    count_with_friction(count, friction)
+}
+
+/// Solves the contacts of one time step, and integrates it if the parameters say so. Returns when
+/// it is done. The bodies change only if the step succeeds, and then all at once.
+///
+/// `report` may be null.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed. Every other pointer is null or the
+/// address of its structure, with the size in it; the arrays are as `zpgs_bodies` and
+/// `zpgs_collisions` describe.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_step(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+    report: *mut Report,
+) -> Status {
+    // SAFETY: the caller promises an open handle.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the caller promises the structure and its arrays.
+        let mut bodies = unsafe { read_bodies(bodies) }?;
+        // SAFETY: the caller promises the structure and its array.
+        let collisions = unsafe { read_collisions(collisions) }?;
+        // SAFETY: the caller promises the structure.
+        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
+        // SAFETY: the caller promises the structure, which nothing else uses meanwhile.
+        let report = unsafe { Out::<Report>::optional(report) }?;
+        let parameters = parameters.driver()?;
+        let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
+        report.into_iter().for_each(|report| report.write(Report::from(&done)));
+        Ok(())
+    })
+}
+
+/// Starts a step and returns at once. The arrays are the caller's again when the call returns. At
+/// most one step of an accelerator is in flight; `zpgs_wait` ends it.
+///
+/// # Safety
+/// As `zpgs_step`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_submit(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+) -> Status {
+    // SAFETY: the caller promises an open handle.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the caller promises the structure and its arrays.
+        let bodies = unsafe { read_bodies(bodies) }?;
+        // SAFETY: the caller promises the structure and its array.
+        let collisions = unsafe { read_collisions(collisions) }?;
+        // SAFETY: the caller promises the structure.
+        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
+        state.submit(&bodies, &collisions, &parameters.driver()?)
+    })
+}
+
+/// Waits for the step in flight and stores its results in the bodies, which must be those of
+/// `zpgs_submit`; their arrays may have moved. Whether it fails or not, no step is in flight
+/// afterwards, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
+/// `ZPGS_STATUS_BUSY`.
+///
+/// `report` may be null.
+///
+/// # Safety
+/// As `zpgs_step`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_wait(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    report: *mut Report,
+) -> Status {
+    // SAFETY: the caller promises an open handle.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the caller promises the structure and its arrays.
+        let mut bodies = unsafe { read_bodies(bodies) }?;
+        // SAFETY: the caller promises the structure, which nothing else uses meanwhile.
+        let report = unsafe { Out::<Report>::optional(report) }?;
+        let done = state.wait(&mut bodies)?;
+        report.into_iter().for_each(|report| report.write(Report::from(&done)));
+        Ok(())
+    })
+}
+
+/// Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
+/// board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
+/// The step after it is not cancelled. Any thread may call it at any time, also during another
+/// call.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> Status {
+    call(|| {
+        // SAFETY: the caller promises an open handle.
+        unsafe { memory::handle(accelerator) }?.cancel();
+        Ok(())
+    })
+}
+
+/// Reads and checks the caller's bodies.
+///
+/// # Safety
+/// The pointer is null or leads to the structure, whose arrays are as it describes.
+unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure> {
+    const NONE: Strided = Strided { data: std::ptr::null_mut(), stride: 0 };
+    let nothing = BodyArrays {
+        size: 0,
+        count: 0,
+        positions: NONE,
+        orientations: NONE,
+        linear_velocities: NONE,
+        angular_velocities: NONE,
+        shapes: StridedConst { data: std::ptr::null(), stride: 0 },
+    };
+    // SAFETY: the caller promises the structure.
+    let arrays = unsafe { memory::read(pointer, nothing) }?;
+    // SAFETY: the caller promises its arrays.
+    unsafe { BodiesView::new(arrays) }
+}
+
+/// Reads and checks the caller's collisions.
+///
+/// # Safety
+/// The pointer is null or leads to the structure, whose array is as it describes.
+unsafe fn read_collisions<'a>(
+    pointer: *const CollisionArray,
+) -> Result<CollisionsView<'a>, Failure> {
+    let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };
+    // SAFETY: the caller promises the structure.
+    let array = unsafe { memory::read(pointer, CollisionArray { size: 0, count: 0, collisions }) }?;
+    // SAFETY: the caller promises its array.
+    unsafe { CollisionsView::new(array) }
+}

@@ -1,0 +1,110 @@
+//! The accelerator behind the opaque handle of C, with its step in flight.
+
+use std::ffi::{CStr, CString, c_char};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+
+use zynq_pgs::{
+    Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, OpenOptions,
+    StepParameters, StepReport,
+};
+
+use crate::failure::Failure;
+use crate::last_error::c_string;
+use crate::status::Status;
+
+/// An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.
+///
+/// One thread at a time may call with it, but for `zpgs_cancel`, which any thread may call. A
+/// second call at the same time is refused with `ZPGS_STATUS_BUSY`.
+#[derive(Debug)]
+pub struct AcceleratorHandle {
+    state: Mutex<State>,
+    cancellation: Cancellation,
+    /// The text of the last call that failed.
+    text: Mutex<CString>,
+}
+
+/// The accelerator, and its step in flight.
+#[derive(Debug)]
+pub(crate) struct State {
+    accelerator: Accelerator,
+    ticket: Option<Detached>,
+}
+
+impl AcceleratorHandle {
+    /// Opens the board that the text names.
+    pub(crate) fn open(board: &str) -> Result<Self, Failure> {
+        let board: BoardChoice = board.parse().map_err(Error::from)?;
+        let mut accelerator = Accelerator::open(OpenOptions { board, ..OpenOptions::default() })?;
+        let cancellation = Cancellation::new();
+        accelerator.set_cancellation(cancellation.clone());
+        let state = Mutex::new(State { accelerator, ticket: None });
+        Ok(Self { state, cancellation, text: Mutex::default() })
+    }
+
+    /// The state, for one call.
+    pub(crate) fn lock(&self) -> Result<MutexGuard<'_, State>, Failure> {
+        let (status, text) = match self.state.try_lock() {
+            Ok(state) => return Ok(state),
+            Err(TryLockError::WouldBlock) => {
+                (Status::Busy, "another thread is in a call with this accelerator: wait for it")
+            }
+            Err(TryLockError::Poisoned(_)) => (
+                Status::Panic,
+                "an earlier call met a mistake of the library: close this accelerator",
+            ),
+        };
+        Err(Failure { status, text: text.to_owned() })
+    }
+
+    /// Ends the step in flight, or else the next one.
+    pub(crate) fn cancel(&self) {
+        self.cancellation.cancel();
+    }
+
+    /// Notes that a call has reported the cancellation.
+    pub(crate) fn cancelled(&self) {
+        self.cancellation.clear();
+    }
+
+    /// Keeps the text of a failed call.
+    pub(crate) fn set_text(&self, text: String) {
+        *self.text.lock().unwrap_or_else(PoisonError::into_inner) = c_string(text);
+    }
+
+    /// The text of the last failed call; it stays until another call fails.
+    pub(crate) fn text(&self) -> *const c_char {
+        let text = self.text.lock().unwrap_or_else(PoisonError::into_inner);
+        CStr::as_ptr(&text)
+    }
+}
+
+impl State {
+    /// The accelerator, if no step is in flight.
+    pub(crate) fn idle(&mut self) -> Result<&mut Accelerator, Failure> {
+        match self.ticket {
+            None => Ok(&mut self.accelerator),
+            Some(_) => Err(Failure::sequence("a step is in flight: call zpgs_wait first")),
+        }
+    }
+
+    /// Starts a step and keeps its ticket.
+    pub(crate) fn submit(
+        &mut self,
+        bodies: &impl Bodies,
+        collisions: &impl Collisions,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
+        let step = self.idle()?.submit(bodies, collisions, parameters)?;
+        self.ticket = Some(step.detach());
+        Ok(())
+    }
+
+    /// Ends the step in flight.
+    pub(crate) fn wait(&mut self, bodies: &mut impl Bodies) -> Result<StepReport, Failure> {
+        let ticket = self.ticket.take();
+        let ticket = ticket
+            .ok_or_else(|| Failure::sequence("no step is in flight: call zpgs_submit first"))?;
+        Ok(self.accelerator.attach(ticket)?.wait(bodies)?)
+    }
+}

@@ -1,0 +1,29 @@
+//! The C interface of the driver `zynq-pgs`.
+//!
+//! `include/zynq_pgs.h` is made from this crate, and `docs/c.md` has its conventions. Every
+//! exported function returns a [`Status`], and no panic leaves one.
+
+#[cfg(not(target_pointer_width = "64"))]
+compile_error!("the C interface is laid out for 64-bit systems");
+
+mod arrays;
+mod barrier;
+mod collision;
+mod exports;
+mod failure;
+mod handle;
+mod last_error;
+mod memory;
+mod parameters;
+mod report;
+mod shape;
+mod status;
+
+pub use arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
+pub use collision::{Collision, Contact, ZPGS_CONTACT_POINTS};
+pub use exports::*;
+pub use handle::AcceleratorHandle;
+pub use parameters::{Order, Parameters};
+pub use report::Report;
+pub use shape::Shape;
+pub use status::Status;

@@ -1,0 +1,299 @@
+//! Views of the caller's arrays that the driver takes as bodies and collisions.
+
+use std::ptr::NonNull;
+use std::slice;
+
+use zynq_pgs::{Bodies, Body, Collision, Collisions, Pose, Structures, Velocity};
+
+use super::pointer::{extent, misaligned};
+use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
+use crate::failure::Failure;
+
+/// One strided array.
+///
+/// Invariant: for every index below the count it was made with, `first` plus the index times the
+/// stride is aligned and leads to an element that is initialised and in the caller's memory.
+#[derive(Debug)]
+struct Column<T> {
+    first: NonNull<T>,
+    stride: usize,
+}
+
+impl<T: Copy> Column<T> {
+    /// Checks the address, the stride and the extent of an array.
+    ///
+    /// # Safety
+    /// `data` is null or leads to `count` elements, `stride` bytes apart, which are initialised and
+    /// live as long as the column is in use. Every bit pattern is a `T`.
+    unsafe fn new(data: StridedConst, count: usize, name: &str) -> Result<Self, Failure> {
+        let StridedConst { data, stride } = data;
+        if count == 0 {
+            return Ok(Self { first: NonNull::dangling(), stride: 0 });
+        }
+        let first = NonNull::new(data.cast_mut()).ok_or_else(|| Failure::null(name))?.cast::<T>();
+        if !first.is_aligned() {
+            return Err(misaligned(name, first.addr().get(), align_of::<T>()));
+        }
+        if stride < size_of::<T>() || !stride.is_multiple_of(align_of::<T>()) {
+            return Err(Failure::argument(format!(
+                "the stride of the {name} is {stride} bytes: give a multiple of {}, at least {}",
+                align_of::<T>(),
+                size_of::<T>()
+            )));
+        }
+        extent(first.addr().get(), stride, size_of::<T>(), count, name)?;
+        Ok(Self { first, stride })
+    }
+
+    /// The address of an element.
+    ///
+    /// # Safety
+    /// `index` is below the count.
+    unsafe fn at(&self, index: usize) -> NonNull<T> {
+        // SAFETY: the element is in the caller's memory (the invariant), and the offset to it does
+        // not overflow: `extent` has checked the last one.
+        unsafe { self.first.byte_add(index * self.stride) }
+    }
+
+    /// An element.
+    ///
+    /// # Safety
+    /// `index` is below the count, and no other thread writes the element.
+    unsafe fn get(&self, index: usize) -> T {
+        // SAFETY: the caller promises the index.
+        let element = unsafe { self.at(index) };
+        // SAFETY: aligned, initialised and in the caller's memory (the invariant); nothing writes
+        // it.
+        unsafe { element.read() }
+    }
+
+    /// Replaces an element.
+    ///
+    /// # Safety
+    /// `index` is below the count, and nothing else reads or writes the element.
+    unsafe fn set(&mut self, index: usize, value: T) {
+        // SAFETY: the caller promises the index.
+        let element = unsafe { self.at(index) };
+        // SAFETY: aligned and in the caller's memory (the invariant), which is writable and which
+        // nothing else reads or writes.
+        unsafe { element.write(value) };
+    }
+}
+
+impl From<Strided> for StridedConst {
+    fn from(Strided { data, stride }: Strided) -> Self {
+        Self { data, stride }
+    }
+}
+
+/// The caller's bodies.
+#[derive(Debug)]
+pub(crate) struct BodiesView {
+    count: usize,
+    positions: Column<[f32; 3]>,
+    orientations: Column<[f32; 4]>,
+    linear_velocities: Column<[f32; 3]>,
+    angular_velocities: Column<[f32; 3]>,
+    shapes: Column<u32>,
+}
+
+impl BodiesView {
+    /// Checks the arrays.
+    ///
+    /// # Safety
+    /// Each array is as [`BodyArrays`] describes, and lives as long as the view is in use. Nothing
+    /// but the view writes the arrays meanwhile.
+    pub(crate) unsafe fn new(arrays: BodyArrays) -> Result<Self, Failure> {
+        let BodyArrays { count, shapes, .. } = arrays;
+        let BodyArrays { positions, orientations, linear_velocities, angular_velocities, .. } =
+            arrays;
+        // SAFETY: the caller promises each array, here and below; floats and integers take every
+        // bit pattern.
+        let positions = unsafe { Column::new(positions.into(), count, "positions") }?;
+        // SAFETY: as above.
+        let orientations = unsafe { Column::new(orientations.into(), count, "orientations") }?;
+        // SAFETY: as above.
+        let linear_velocities =
+            unsafe { Column::new(linear_velocities.into(), count, "linear velocities") }?;
+        // SAFETY: as above.
+        let angular_velocities =
+            unsafe { Column::new(angular_velocities.into(), count, "angular velocities") }?;
+        // SAFETY: as above.
+        let shapes = unsafe { Column::new(shapes, count, "shapes of the bodies") }?;
+        Ok(Self { count, positions, orientations, linear_velocities, angular_velocities, shapes })
+    }
+
+    /// Makes sure that an index is below the count, as the driver promises.
+    fn check(&self, index: usize) {
+        assert!(index < self.count, "body {index} of {}", self.count);
+    }
+}
+
+// SAFETY: a shared view only reads, and nothing else writes the arrays while it is in use (`new`).
+unsafe impl Sync for BodiesView {}
+
+impl Bodies for BodiesView {
+    fn len(&self) -> usize {
+        self.count
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self.check(index);
+        // SAFETY: the index is below the count, and a shared view has no writer; both hold below.
+        let position = unsafe { self.positions.get(index) };
+        // SAFETY: as above.
+        let orientation = unsafe { self.orientations.get(index) };
+        // SAFETY: as above.
+        let linear = unsafe { self.linear_velocities.get(index) };
+        // SAFETY: as above.
+        let angular = unsafe { self.angular_velocities.get(index) };
+        // SAFETY: as above.
+        let shape = unsafe { self.shapes.get(index) };
+        let pose = Pose { position, orientation };
+        Body { pose, velocity: Velocity { linear, angular }, shape }
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.check(index);
+        // SAFETY: the index is below the count, and the view is borrowed by this call alone; both
+        // hold below.
+        unsafe { self.positions.set(index, pose.position) };
+        // SAFETY: as above.
+        unsafe { self.orientations.set(index, pose.orientation) };
+        // SAFETY: as above.
+        unsafe { self.linear_velocities.set(index, velocity.linear) };
+        // SAFETY: as above.
+        unsafe { self.angular_velocities.set(index, velocity.angular) };
+    }
+}
+
+/// The caller's collisions.
+#[derive(Debug)]
+pub(crate) struct CollisionsView<'a> {
+    count: usize,
+    column: Column<Collision>,
+    /// All of them, where they lie without gaps.
+    dense: Option<&'a [Collision]>,
+}
+
+impl CollisionsView<'_> {
+    /// Checks the array.
+    ///
+    /// # Safety
+    /// The array is as [`CollisionArray`] describes, and lives as long as the view is in use.
+    /// Nothing writes it meanwhile.
+    pub(crate) unsafe fn new(array: CollisionArray) -> Result<Self, Failure> {
+        let CollisionArray { count, collisions, .. } = array;
+        // SAFETY: the caller promises the array; a `Collision` takes every bit pattern.
+        let column = unsafe { Column::new(collisions, count, "collisions") }?;
+        let dense = if column.stride == size_of::<Collision>() || count == 0 {
+            // SAFETY: `count` elements without gaps, aligned and within the address space (the
+            // invariant of the column), which nothing writes.
+            Some(unsafe { slice::from_raw_parts(column.first.as_ptr(), count) })
+        } else {
+            None
+        };
+        Ok(Self { count, column, dense })
+    }
+}
+
+// SAFETY: the view only reads, and nothing writes the array while it is in use (`new`).
+unsafe impl Sync for CollisionsView<'_> {}
+
+impl Collisions for CollisionsView<'_> {
+    fn len(&self) -> usize {
+        self.count
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        assert!(index < self.count, "collision {index} of {}", self.count);
+        // SAFETY: the index is below the count, and nothing writes the array.
+        unsafe { self.column.get(index) }
+    }
+
+    fn structures(&self) -> Option<Structures<'_>> {
+        self.dense.map(Structures::Array)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zynq_pgs::Contact;
+
+    /// Three bodies of 16 words: position, orientation, both velocities, shape, two words between.
+    fn words() -> [[f32; 16]; 3] {
+        [0, 1, 2].map(|body| std::array::from_fn(|word| (100 * body + word) as f32))
+    }
+
+    fn arrays(words: &mut [[f32; 16]; 3], shapes: &[u32; 3]) -> BodyArrays {
+        let first = words.as_mut_ptr().cast::<f32>();
+        let column = |word| Strided { data: first.wrapping_add(word).cast(), stride: 64 };
+        BodyArrays {
+            size: size_of::<BodyArrays>(),
+            count: 3,
+            positions: column(0),
+            orientations: column(3),
+            linear_velocities: column(8),
+            angular_velocities: column(11),
+            shapes: StridedConst { data: shapes.as_ptr().cast(), stride: 4 },
+        }
+    }
+
+    #[test]
+    fn each_element_is_read_and_written_at_its_stride_and_nothing_between() {
+        let (mut words, shapes) = (words(), [5, 6, 7]);
+        let arrays = arrays(&mut words, &shapes);
+        // SAFETY: the arrays are in `words` and `shapes`, which nothing uses until the view ends.
+        let mut view = unsafe { BodiesView::new(arrays) }.expect("arrays");
+        let Body { pose, velocity, shape } = view.body(2);
+        let found =
+            [pose.position[0], pose.orientation[3], velocity.linear[2], velocity.angular[1]];
+        assert_eq!(
+            (found.map(f32::to_bits), shape),
+            ([200.0, 206.0, 210.0, 212.0].map(f32::to_bits), 7)
+        );
+        let pose = Pose { position: [-1.0; 3], orientation: [-2.0; 4] };
+        view.commit(1, pose, Velocity { linear: [-3.0; 3], angular: [-4.0; 3] });
+        let mut expected = self::words();
+        expected[1][..3].fill(-1.0);
+        expected[1][3..7].fill(-2.0);
+        expected[1][8..11].fill(-3.0);
+        expected[1][11..14].fill(-4.0);
+        assert_eq!(
+            words.map(|body| body.map(f32::to_bits)),
+            expected.map(|body| body.map(f32::to_bits))
+        );
+    }
+
+    #[test]
+    fn dense_collisions_are_structures_and_others_are_read_one_by_one() {
+        let contacts = [Contact::default(); 4];
+        let all = [0, 1, 2, 3].map(|body_a| Collision {
+            body_a,
+            body_b: 9,
+            normal: [0.0; 3],
+            count: 1,
+            contacts,
+        });
+        let array = |count, times| CollisionArray {
+            size: size_of::<CollisionArray>(),
+            count,
+            collisions: StridedConst {
+                data: all.as_ptr().cast(),
+                stride: times * size_of::<Collision>(),
+            },
+        };
+        // SAFETY: four elements.
+        let dense = unsafe { CollisionsView::new(array(4, 1)) }.expect("an array");
+        let Some(Structures::Array(structures)) = dense.structures() else { panic!("dense") };
+        assert_eq!((structures, dense.collision(3).body_a), (&all[..], 3));
+        // SAFETY: every second of four elements.
+        let apart = unsafe { CollisionsView::new(array(2, 2)) }.expect("an array");
+        assert!(apart.structures().is_none());
+        assert_eq!((apart.len(), apart.collision(1).body_a), (2, 2));
+        // SAFETY: no element.
+        let none = unsafe { CollisionsView::new(array(0, 0)) }.expect("an array");
+        assert!(none.structures().is_some_and(|all| all.is_empty()));
+    }
+}
