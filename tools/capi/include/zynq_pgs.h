@@ -21,7 +21,8 @@
 #define ZPGS_ABI_VERSION 0
 
 // How a call ended, and what the caller can do next. A call that did not end in `ZPGS_STATUS_OK`
-// has changed nothing of the caller's, and `zpgs_last_error` has its text.
+// has changed nothing of the caller's, and `zpgs_last_error` has its text. Only `zpgs_open` then
+// stores a null handle.
 typedef enum zpgs_status {
     // Done.
     ZPGS_STATUS_OK = 0,
@@ -243,8 +244,8 @@ uint32_t zpgs_abi_version(void);
 
 // Opens a board.
 //
-// `board` names it: "auto", "uio[:NODE]", "devmem", "emulated[:BUILD]" such as
-// "emulated:float,world", or "socket:PATH". `accelerator` receives the handle, or null where the
+// `board` names it: `auto`, `uio` or `uio:NODE`, `devmem`, `emulated` or with a build, such as
+// `emulated:float,world`, or `socket:PATH`. `accelerator` receives the handle, or null where the
 // call fails; `zpgs_last_error` of null then has the text.
 //
 // # Safety

@@ -40,8 +40,8 @@ pub extern "C" fn zpgs_abi_version() -> u32 {
 
 /// Opens a board.
 ///
-/// `board` names it: "auto", "uio[:NODE]", "devmem", "emulated[:BUILD]" such as
-/// "emulated:float,world", or "socket:PATH". `accelerator` receives the handle, or null where the
+/// `board` names it: `auto`, `uio` or `uio:NODE`, `devmem`, `emulated` or with a build, such as
+/// `emulated:float,world`, or `socket:PATH`. `accelerator` receives the handle, or null where the
 /// call fails; `zpgs_last_error` of null then has the text.
 ///
 /// # Safety

@@ -1,7 +1,8 @@
 //! The status that every call of the C interface returns.
 
 /// How a call ended, and what the caller can do next. A call that did not end in `ZPGS_STATUS_OK`
-/// has changed nothing of the caller's, and `zpgs_last_error` has its text.
+/// has changed nothing of the caller's, and `zpgs_last_error` has its text. Only `zpgs_open` then
+/// stores a null handle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub enum Status {
