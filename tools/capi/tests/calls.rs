@@ -191,6 +191,22 @@ fn a_step_over_the_engines_own_structures_gives_the_drivers_bits() {
 }
 
 #[test]
+fn threads_that_share_the_packing_read_the_same_bodies() {
+    let (open, many) = (Open::new("emulated:float"), 5000_u16);
+    let mut crates: Vec<_> = (0..many).map(|at| crate_at(f32::from(at), 1, -1.0)).collect();
+    let all = collisions(&[]);
+    assert_eq!(open.step(&arrays(&mut crates), &all, &defaults()), Status::Ok, "{}", open.text());
+    let alone = |at: u16| {
+        let mut crates = [crate_at(f32::from(at), 1, -1.0)];
+        assert_eq!(open.step(&arrays(&mut crates), &all, &defaults()), Status::Ok);
+        crates[0]
+    };
+    for at in (0..many).step_by(499) {
+        assert_eq!(crates[usize::from(at)], alone(at), "{at}");
+    }
+}
+
+#[test]
 fn collisions_with_gaps_between_them_are_the_same_collisions() {
     let (open, mut crates) = (Open::new("emulated:float"), world());
     let apart = [(collision(), [f32::NAN; 3]), (Collision::default(), [f32::NAN; 3])];
