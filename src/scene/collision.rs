@@ -68,7 +68,6 @@ impl Collision {
     #[must_use]
     pub fn friction(&self) -> f32 {
         let bits = (self.count & layout::FRICTION_BITS) >> layout::FRICTION_SHIFT;
-        #[expect(clippy::cast_possible_truncation, reason = "fifteen bits")]
         f16::from_bits(bits as u16).to_f32()
     }
 
