@@ -184,8 +184,8 @@ mod tests {
         let refused = check_parameters(&parameters, &NEEDS, &old).expect_err("version 1.1");
         assert_eq!(
             refused.to_string(),
-            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one of \
-             interface version 1.2 with this extension (profiles that could: naive, float, half, \
+            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one with \
+             this extension of interface 1.2 (profiles that could: naive, float, half, \
              mixed, windowed, windowed16)"
         );
     }
