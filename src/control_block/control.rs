@@ -146,6 +146,16 @@ mod tests {
     }
 
     #[test]
+    fn each_switch_has_its_bit() {
+        let word = |parameters: StepParameters| flags_of(&parameters);
+        let none = StepParameters::default().with_integrate(false);
+        assert_eq!(word(none), 0b000);
+        assert_eq!(word(StepParameters::default()), 0b001);
+        assert_eq!(word(none.with_kinematic(true)), 0b010);
+        assert_eq!(word(none.with_pair_friction(true)), 0b100);
+    }
+
+    #[test]
     fn a_board_of_version_1_1_gets_no_argument_that_it_lacks() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));

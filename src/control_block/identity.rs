@@ -195,7 +195,8 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     Ok(Capabilities {
         variant,
         version: (major, minor),
-        extensions: Extensions::reported(able),
+        // A bit that the design cannot have means nothing.
+        extensions: Extensions::reported(able).and(Extensions::possible(&variant)),
         interlocked: features::INTERLOCKED.is_set(able),
         checksums: features::CHECKSUMS.is_set(able),
         flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),

@@ -115,7 +115,7 @@ impl InputBuffers {
             if collision.is_empty() {
                 return OrderInput::EMPTY;
             }
-            // Two bodies that do not exist must not look like no bodies. The error names A.
+            // A pair of `u32::MAX` would look like `EMPTY`: B becomes one less, and the error names A.
             let Collision { body_a, body_b, .. } = collision;
             [body_a, body_b.min(u32::MAX - u32::from(body_a == u32::MAX))]
         }));

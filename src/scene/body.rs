@@ -36,7 +36,8 @@ pub struct Velocity {
 pub struct Body {
     /// Position and orientation.
     pub pose: Pose,
-    /// Linear and angular velocity; zero for a static body.
+    /// Linear and angular velocity; zero for a static body, unless a step lets it
+    /// [move](crate::StepParameters::kinematic).
     pub velocity: Velocity,
     /// Index into the shapes given to `Accelerator::set_shapes`.
     pub shape: u32,

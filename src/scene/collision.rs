@@ -48,7 +48,7 @@ pub struct Collision {
     /// Number of contact points, 0 to [`CONTACT_POINTS`], and the friction of the pair, if it has one
     /// of its own: [`with_friction`](Self::with_friction) puts it above the number.
     pub count: u32,
-    /// The contact points; the elements from `count` on are ignored.
+    /// The contact points; the elements behind their number are ignored.
     pub contacts: [Contact; CONTACT_POINTS],
 }
 
@@ -56,9 +56,13 @@ impl Collision {
     /// The collision with a friction coefficient of its own, rounded to binary16 (three digits, at
     /// most 65504). A step uses it with
     /// [`StepParameters::pair_friction`](crate::StepParameters::pair_friction), and refuses it
-    /// without, as it refuses one that is not finite. The sign is dropped.
+    /// without; it also refuses one that is negative or not finite. An empty collision stays empty.
     #[must_use]
     pub fn with_friction(self, friction: f32) -> Self {
+        if self.is_empty() {
+            return self;
+        }
+        let friction = if friction >= 0.0 { friction } else { f32::NAN };
         let bits = u32::from(f16::from_f32(friction).to_bits()) << layout::FRICTION_SHIFT;
         let count = (self.count & !layout::FRICTION_BITS) | (bits & layout::FRICTION_BITS);
         Self { count, ..self }
@@ -68,7 +72,6 @@ impl Collision {
     #[must_use]
     pub fn friction(&self) -> f32 {
         let bits = (self.count & layout::FRICTION_BITS) >> layout::FRICTION_SHIFT;
-        #[expect(clippy::cast_possible_truncation, reason = "fifteen bits")]
         f16::from_bits(bits as u16).to_f32()
     }
 
@@ -83,7 +86,7 @@ impl Collision {
     #[inline(always)]
     #[must_use]
     pub const fn is_empty(&self) -> bool {
-        self.points() == 0
+        self.count == 0
     }
 
     /// The number of contact points, without the friction.
@@ -189,7 +192,8 @@ pub struct CollisionArrays<'a> {
     pub bodies: &'a [[u32; 2]],
     /// Unit normals from B to A.
     pub normals: &'a [[f32; 3]],
-    /// Numbers of contact points; 0 for an empty collision.
+    /// Numbers of contact points; 0 for an empty collision. The friction of a pair is above its number,
+    /// as in [`Collision::count`].
     pub counts: &'a [u32],
     /// Contact points: x, y, z on B's surface, and signed distance, m.
     pub contacts: &'a [[[f32; 4]; CONTACT_POINTS]],

@@ -105,7 +105,8 @@ pub struct StepParameters {
     /// Friction coefficient of every contact, unless each collision has its own.
     pub friction: f32,
     /// Whether each collision has a friction of its own
-    /// ([`Collision::with_friction`](crate::Collision::with_friction)); one without has 0.
+    /// ([`Collision::with_friction`](crate::Collision::with_friction)). A collision without one then
+    /// has a friction of 0.
     pub pair_friction: bool,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,

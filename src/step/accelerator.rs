@@ -151,7 +151,7 @@ impl Accelerator {
     /// Solves the contacts of one time step and integrates it.
     ///
     /// The board takes the collisions in the [order](StepParameters::order) that the parameters ask
-    /// for. Static bodies stay as they are. The bodies change only if the step succeeds, and then
+    /// for. Static bodies stay as they are, unless they are [kinematic](StepParameters::kinematic). The bodies change only if the step succeeds, and then
     /// all at once.
     ///
     /// Units: metres, kilograms, seconds, radians, world frame.

@@ -97,6 +97,7 @@ impl Accelerator {
             lives: None,
             shapes: &self.shapes,
             quick: None,
+            kinematic: false,
         };
         let (sent, _) = self.device.pack(&plan, bank, &input);
         let parameters = StepParameters {

@@ -100,16 +100,18 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
         scene: Scene<'a>,
     ) -> (SentSums, Seen) {
         let Self { bodies, collisions, shapes, .. } = *self;
+        let kinematic = scene.kinematic;
         let quick = Quick::new(scene);
         let (lives, quick) = (order_summary.live.map(|_| ordering.lives()), Some(&quick));
         if order_summary.scheduled {
             let schedule = ordering.schedule();
             let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
             let collisions = &Ordered { collisions, schedule };
-            let input = PackInput { bodies, collisions, added, lives, shapes, quick };
+            let input = PackInput { bodies, collisions, added, lives, shapes, quick, kinematic };
             device.pack(plan, bank, &input)
         } else {
-            let input = PackInput { bodies, collisions, added: None, lives, shapes, quick };
+            let input =
+                PackInput { bodies, collisions, added: None, lives, shapes, quick, kinematic };
             device.pack(plan, bank, &input)
         }
     }

@@ -37,6 +37,8 @@ pub(super) struct PackInput<'a, B: ?Sized, C: ?Sized> {
     pub(super) shapes: &'a [Shape],
     /// Screens the input during packing.
     pub(super) quick: Option<&'a Quick<'a>>,
+    /// Whether static bodies may move.
+    pub(super) kinematic: bool,
 }
 
 impl Device {
@@ -48,7 +50,7 @@ impl Device {
         bank: Bank,
         input: &PackInput<'_, B, C>,
     ) -> (SentSums, Seen) {
-        let PackInput { bodies, collisions, added, lives, shapes, quick } = *input;
+        let PackInput { bodies, collisions, added, lives, shapes, quick, kinematic } = *input;
         let SegmentBuffers { mut velocities, mut poses, mut entries } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
@@ -68,7 +70,9 @@ impl Device {
                 (velocities, poses, passed & first_passed & last_passed)
             }
         };
-        self.statics[bank].retain(|body| rests(bodies, *body));
+        if kinematic {
+            self.statics[bank].retain(|body| rests(bodies, *body));
+        }
         let words = lives.map(Lives::words);
         let of_entries = Entries { collisions, count: plan.collisions, added, words };
         let (collisions, mut seen) =
@@ -85,7 +89,7 @@ impl Device {
         plan: &Plan,
         bank: Bank,
         target: Target<'_>,
-        bodies: &B,
+        (bodies, kinematic): (&B, bool),
         refuse: impl FnOnce() -> Result<(), InputError>,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
     ) -> Result<(Option<SentSums>, Written), InputError> {
@@ -101,7 +105,9 @@ impl Device {
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
-        self.statics[bank].retain(|body| rests(bodies, *body));
+        if kinematic {
+            self.statics[bank].retain(|body| rests(bodies, *body));
+        }
         if !passed {
             refuse()?;
             return Err(InputError::Unsteady);

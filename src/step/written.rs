@@ -117,8 +117,14 @@ impl Accelerator {
         let quick = Quick::new(scene);
         let target = Target { variant: &variant, shapes, quick: Some(&quick) };
         let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
-        let (sent, written) =
-            device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
+        let (sent, written) = device.pack_written(
+            &plan,
+            bank,
+            target,
+            (bodies, parameters.kinematic),
+            check_bodies,
+            narrow_phase,
+        )?;
         plan.collisions = if sent.is_some() { written.collisions } else { 0 };
         host.pack = watch.lap();
         Ok(self.keep(PackedStep {

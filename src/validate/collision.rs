@@ -2,6 +2,7 @@
 
 use super::InputError;
 use super::{all_within, first};
+use crate::record::FULL;
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
 /// Checks a collision with contact points, without its bodies; returns their indices. With
@@ -22,6 +23,9 @@ pub(crate) fn check_collision(
         return Err(InputError::SelfCollision { collision: index, body: collision.body_a });
     }
     let points = if pair_friction { collision.points() } else { collision.count };
+    if points != collision.points() && (1..=FULL).contains(&collision.points()) {
+        return Err(InputError::OwnFriction { collision: index });
+    }
     let count = match usize::try_from(points) {
         Ok(count @ ..=CONTACT_POINTS) => count,
         _ => {
@@ -100,8 +104,15 @@ mod tests {
         assert_eq!((own.points(), own.count), (3, 0x34CD_0003));
         assert!((own.friction() - 0.3).abs() < 1e-4);
         assert_eq!(own.with_friction(0.0).count, COLLISION.count);
+        let empty = Collision { count: 0, ..COLLISION };
+        assert_eq!(empty.with_friction(0.5).count, 0);
+        let negative = COLLISION.with_friction(-0.5);
+        assert!(matches!(
+            check_collision(5, &negative, 3, true),
+            Err(InputError::FrictionNotFinite { collision: 5, .. })
+        ));
         assert_eq!(check_collision(5, &own, 3, true), Ok((2, 0)));
-        let refused = InputError::ContactCount { collision: 5, found: own.count };
+        let refused = InputError::OwnFriction { collision: 5 };
         assert_eq!(check_collision(5, &own, 3, false), Err(refused));
         let found = f32::INFINITY;
         assert_eq!(
@@ -164,7 +175,7 @@ mod tests {
             let collision = Collision { count, contacts, ..COLLISION };
             assert_eq!(check_collision(5, &collision, 3, false), Ok((2, 0)));
         }
-        for found in [5, u32::MAX] {
+        for found in [5, 0x1_0000, 0x7FFF_0000, u32::MAX] {
             assert_eq!(
                 refused(&Collision { count: found, contacts, ..COLLISION }),
                 InputError::ContactCount { collision: 5, found }

@@ -122,11 +122,18 @@ pub enum InputError {
         found: f32,
     },
 
-    /// The friction of a collision is not finite.
+    /// A collision has a friction of its own, and the step does not ask for it.
     #[error(
-        "collision {collision}: its friction is {found}, expected a finite number: binary16 ends at \
-         65504"
+        "collision {collision} has a friction of its own: set `StepParameters::pair_friction`, or \
+         leave it out"
     )]
+    OwnFriction {
+        /// The collision.
+        collision: usize,
+    },
+
+    /// The friction of a collision is negative, no number, or beyond binary16.
+    #[error("collision {collision}: its friction is {found}, expected 0 to 65504: correct it")]
     FrictionNotFinite {
         /// The collision.
         collision: usize,

@@ -11,7 +11,7 @@ pub enum Excess {
     /// A parameter that takes an extension of the interface.
     #[error(
         "the {parameter} is {found}, and this bitstream knows {known} only: give {known}, or load one \
-         of interface version 1.2 with this extension"
+         with this extension of interface 1.2"
     )]
     Extension {
         /// The parameter.
@@ -25,7 +25,7 @@ pub enum Excess {
     /// The step asks for an extension of the interface.
     #[error(
         "the step asks for {extension}, which this bitstream does not have: do without, or load one \
-         of interface version 1.2 with this extension"
+         with this extension of interface 1.2"
     )]
     Lacks {
         /// The extension.

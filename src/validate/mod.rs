@@ -208,7 +208,7 @@ pub(crate) struct Scene<'a> {
     held: Held,
     flush_subnormals: bool,
     /// Whether static bodies may move.
-    kinematic: bool,
+    pub(crate) kinematic: bool,
     /// Whether each collision has a friction of its own.
     pair_friction: bool,
 }

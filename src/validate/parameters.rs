@@ -11,6 +11,9 @@ use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
 
+/// Whether an extension is among these.
+type Has = fn(Extensions) -> bool;
+
 /// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
@@ -51,20 +54,14 @@ pub(crate) fn check_parameters(
         let excess = Excess::Extension { parameter, found, known: SPIN_DAMPING };
         return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
     }
-    let extensions = limits.extensions;
-    let asked: [(&str, bool, bool, fn(Extensions) -> bool); 2] = [
-        ("static bodies that move", parameters.kinematic, extensions.kinematic, |of| of.kinematic),
-        (
-            "a friction for each collision",
-            parameters.pair_friction,
-            extensions.pair_friction,
-            |of| of.pair_friction,
-        ),
+    let asked = [
+        ("static bodies that move", parameters.kinematic, (|of| of.kinematic) as Has),
+        ("a friction for each collision", parameters.pair_friction, |of| of.pair_friction),
     ];
-    for (extension, wanted, there, can) in asked {
-        if wanted && !there {
+    for (extension, wanted, has) in asked {
+        if wanted && !has(limits.extensions) {
             let excess = Excess::Lacks { extension };
-            return Err(needs.refuse(excess, |variant| can(Extensions::possible(variant))));
+            return Err(needs.refuse(excess, |variant| has(Extensions::possible(variant))));
         }
     }
     if computes_short(&limits.variant.numbers) {
@@ -187,8 +184,8 @@ mod tests {
         let refused = check_parameters(&parameters, &NEEDS, &old).expect_err("version 1.1");
         assert_eq!(
             refused.to_string(),
-            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one of \
-             interface version 1.2 with this extension (profiles that could: naive, float, half, \
+            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one with \
+             this extension of interface 1.2 (profiles that could: naive, float, half, \
              mixed, windowed, windowed16)"
         );
     }

@@ -277,7 +277,7 @@ pub(crate) fn direct_step(
         let given = body.velocity;
         if moving.m != 0.0 {
             integrate(body, moving, parameters);
-        } else if moving.v != [0.0; 3] || moving.w != [0.0; 3] {
+        } else if given != Velocity::default() {
             integrate(body, moving, &undamped);
             body.velocity = given;
         }

@@ -49,10 +49,11 @@ pub mod flags {
     /// and without gravity.
     pub const INTEGRATE: Field = Field::bit("integrate", 0, Access::ReadWrite);
     /// Bodies of inverse mass 0 have the velocity of their record. Without it they are at rest,
-    /// whatever the record holds. Only in a bitstream with [`features::KINEMATIC`](super::features::KINEMATIC).
+    /// whatever the record holds. Only in a bitstream with
+    /// [`features::KINEMATIC`](super::features::KINEMATIC).
     pub const KINEMATIC: Field = Field::bit("kinematic", 1, Access::ReadWrite);
-    /// The friction of a collision is beside its contact count, and FRICTION counts for none. Only in
-    /// a bitstream with [`features::PAIR_FRICTION`](super::features::PAIR_FRICTION).
+    /// The friction of a collision is above its contact count, and FRICTION is not used. Only in a
+    /// bitstream with [`features::PAIR_FRICTION`](super::features::PAIR_FRICTION).
     pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 2, Access::ReadWrite);
 }
 

@@ -43,16 +43,19 @@ impl Extensions {
             | bit(features::PAIR_FRICTION, self.pair_friction)
     }
 
-    /// The extensions that a bitstream of a variant can have: static bodies have a velocity where all
-    /// bodies are on chip, and a friction fits beside the contact count in a word of 32 bits.
+    /// The extensions that a bitstream of a variant can have. A static body that moves needs its
+    /// record, its own position in the records of collisions (a relative one gives it the other
+    /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, .. } = variant;
+        let absolute = matches!(profile.geometry, Geometry::Absolute);
         Self {
             spin_damping: true,
-            kinematic: matches!(profile.flow, Flow::Passes),
-            pair_friction: matches!(profile.geometry, Geometry::Absolute)
-                && matches!(numbers.collisions, StreamFormat::F32),
+            kinematic: matches!(profile.flow, Flow::Passes)
+                && absolute
+                && !matches!(numbers.bodies, StreamFormat::Thesis16),
+            pair_friction: absolute && matches!(numbers.collisions, StreamFormat::F32),
         }
     }
 

@@ -1,4 +1,4 @@
-// The f32 of a binary16 number that is not negative. Every one of them has one.
+// A binary16 number that is not negative as f32: exact, without a register, subnormal numbers included.
 `default_nettype none
 
 module half_to_float (

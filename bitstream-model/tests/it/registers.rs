@@ -8,6 +8,7 @@ use pgs_interface::axi_dma::{
 };
 use pgs_interface::control;
 use pgs_interface::descriptor::status;
+use pgs_interface::extension::Extensions;
 
 use crate::common::ring::{Ring, WHOLE, halves};
 use crate::common::{BOTH, CORES, Host, numbered};
@@ -196,6 +197,18 @@ fn curdesc_is_cut_to_bits_31_6_and_ignored_while_running() {
 }
 
 #[test]
+fn a_board_without_an_extension_lacks_its_register_and_its_switches() {
+    let config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };
+    let host = Host::lenient(config);
+    let address = CONTROL_BASE + 0x78;
+    host.port.write32(address, u32::MAX);
+    assert_eq!(host.port.read32(address), 0);
+    let kind = ViolationKind::ReservedRegister { address };
+    assert_eq!(host.violations(), [kind, kind]);
+    assert_eq!(host.control(control::FEATURES), 0b1011);
+}
+
+#[test]
 fn curdesc_is_not_writable_between_rs_and_halted() {
     let host = Host::lenient(BoardConfig::default());
     host.write(0, Direction::Mm2s, DMACR, 0x0001_0001);
@@ -312,7 +325,7 @@ fn the_doorbell_is_taildesc_with_32_bit_addresses_and_taildesc_msb_with_wider_on
 #[test]
 fn reserved_offsets_read_0_ignore_writes_and_are_violations() {
     let dma = [0x20, 0x24, 0x2C, 0x50, 0x54, 0x5C, 0x60, 0xFFFC].map(|at| dma_base(1) + at);
-    let control = [0x14, 0x78, 0x150, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
+    let control = [0x14, 0x7C, 0x150, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
     for address in dma.into_iter().chain(control) {
         let host = Host::lenient(BoardConfig::default());
         host.port.write32(address, u32::MAX);
@@ -405,8 +418,8 @@ fn misread_identity_is_impossible_on_a_live_board() {
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
     assert_eq!(host.control(control::VERSION), 0x0001_0002);
     assert_eq!(host.control(control::PROFILE), 1);
-    // Checksums, interlocked, impulse sum.
-    assert_eq!(host.control(control::FEATURES), 0b1011);
+    // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction.
+    assert_eq!(host.control(control::FEATURES), 0b1110_1011);
     assert_eq!(host.control(control::CHANNELS), 0x0404);
     // 16 bytes are 2^4.
     assert_eq!(host.control(control::MM2S_WIDTHS), 0x4444);
@@ -436,7 +449,7 @@ fn arguments_and_shapes_read_back_and_a_reset_clears_them() {
         .iter()
         .filter(|register| (0x10..0x100).contains(&register.offset))
         .collect();
-    assert_eq!(arguments.len(), 13);
+    assert_eq!(arguments.len(), 14);
     for register in &arguments {
         host.set_control(**register, 0x8000_0000 | register.offset);
     }
@@ -453,7 +466,7 @@ fn arguments_and_shapes_read_back_and_a_reset_clears_them() {
     host.pause(10);
     assert_eq!(host.control(control::RESET), 0);
     for register in &arguments {
-        assert_eq!(host.control(**register), 0, "{}", register.name);
+        assert_eq!(host.control(**register), register.reset, "{}", register.name);
     }
     assert_eq!(host.port.read32(CONTROL_BASE + 0x404 + 63 * 16), 0);
     assert_eq!(host.control(control::AP_CTRL), 0x4, "idle");

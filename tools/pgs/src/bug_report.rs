@@ -87,6 +87,8 @@ fn parameters_json(parameters: &StepParameters) -> Value {
         "friction": parameters.friction,
         "angular_damping": parameters.angular_damping,
         "spin_damping": parameters.spin_damping,
+        "kinematic": parameters.kinematic,
+        "pair_friction": parameters.pair_friction,
         "gravity_m_s2": parameters.gravity,
         "contact_iterations": parameters.contact_iterations,
         "friction_iterations": parameters.friction_iterations,

@@ -161,6 +161,9 @@ pub(super) fn parameters(
         parameters.position_coefficient = input.pick(&[0.0, 0.5, 1.0]);
         parameters.gravity = vector(input, 8.0);
     }
+    if switches & 16 == 16 {
+        parameters.spin_damping = input.pick(&[0.0, 0.5, 1.0]);
+    }
     if switches & 12 == 12 {
         parameters.order = Some(input.pick(&[
             Order::AsGiven,

@@ -6,7 +6,7 @@
 //!   for k = 0, 1:  row(t_k, c - pA, c - pB)
 //!     l = e * J;  u = min(max(G_k + l, -limit), limit);  l = u - G_k;  G_k = u;  apply
 //!   if mA == 0 or mB == 0 or dot(unit(pB - pA), unit(c - pA)) > 0.95:
-//!     wA -= q * (dot(q,wA) * damping);  wB -= q * (dot(q,wB) * damping)      both dots before both updates
+//!     wA -= q * (dot(q,wA) * s);  wB -= q * (dot(q,wB) * s)      both dots before both updates
 //!
 //! tangents(n), |n.z| > sqrt(1/2):  s = n.y*n.y + n.z*n.z   k = 1/sqrt(s)
 //!                                  t_0 = (0, -n.z*k, n.y*k)   t_1 = (s*k, -n.x*t_0.z, n.x*t_0.y)
