@@ -108,16 +108,16 @@ while read -r profile thing limit; do
 	case $thing in *in-order) entries=$((entries + added)) ;; esac
 	hold "$what" $(((counted[1] - counted[0]) * 10 / packings / entries)) "an entry" "$limit"
 done <<'LIMITS'
-float as-given 49
-float in-order 75
+float as-given 57
+float in-order 84
 float checked-as-given 127
 float checked-in-order 163
-half as-given 38
-half in-order 54
+half as-given 43
+half in-order 57
 half checked-as-given 145
 half checked-in-order 173
-mixed as-given 45
-mixed in-order 65
+mixed as-given 49
+mixed in-order 70
 mixed checked-as-given 127
 mixed checked-in-order 160
 LIMITS
