@@ -73,7 +73,7 @@ pub(crate) struct Device {
     pub(crate) packers: PackPool,
     /// The bodies of the step being packed; kept, so that a step allocates no memory.
     pub(crate) ends: Table,
-    /// Indices of the static bodies of the step in each bank, ascending.
+    /// Indices of the static bodies at rest of the step in each bank, ascending.
     pub(crate) statics: PerBank<Vec<u32>>,
 }
 

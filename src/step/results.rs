@@ -97,8 +97,8 @@ impl Results<'_> {
     /// Reads the results of `count` bodies in their order. Returns the sum of the words, and the
     /// first body that is not finite.
     ///
-    /// A static body does not move, whatever comes back for it: `statics` are the indices of the
-    /// static bodies, ascending.
+    /// A static body at rest does not move, whatever comes back for it: `statics` are the indices of
+    /// these bodies, ascending.
     pub(crate) fn read_in_order<B: Bodies + ?Sized>(
         self,
         count: usize,

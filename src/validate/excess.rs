@@ -8,12 +8,12 @@ use pgs_interface::number::StreamFormat;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Excess {
-    /// A parameter that takes an extension of the interface.
+    /// Another value of a parameter that is fixed without an extension of the interface.
     #[error(
         "the {parameter} is {found}, and this bitstream knows {known} only: give {known}, or load one \
          with this extension of interface 1.2"
     )]
-    Extension {
+    FixedParameter {
         /// The parameter.
         parameter: &'static str,
         /// Its value.
@@ -27,7 +27,7 @@ pub enum Excess {
         "the step asks for {extension}, which this bitstream does not have: do without, or load one \
          with this extension of interface 1.2"
     )]
-    Lacks {
+    MissingExtension {
         /// The extension.
         extension: &'static str,
     },

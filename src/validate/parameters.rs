@@ -51,7 +51,7 @@ pub(crate) fn check_parameters(
     }
     if !limits.extensions.spin_damping && spin_damping.to_bits() != SPIN_DAMPING.to_bits() {
         let (parameter, found) = ("spin damping", spin_damping);
-        let excess = Excess::Extension { parameter, found, known: SPIN_DAMPING };
+        let excess = Excess::FixedParameter { parameter, found, known: SPIN_DAMPING };
         return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
     }
     let asked = [
@@ -60,7 +60,7 @@ pub(crate) fn check_parameters(
     ];
     for (extension, wanted, has) in asked {
         if wanted && !has(limits.extensions) {
-            let excess = Excess::Lacks { extension };
+            let excess = Excess::MissingExtension { extension };
             return Err(needs.refuse(excess, |variant| has(Extensions::possible(variant))));
         }
     }

@@ -197,7 +197,7 @@ fn curdesc_is_cut_to_bits_31_6_and_ignored_while_running() {
 }
 
 #[test]
-fn a_board_without_an_extension_lacks_its_register_and_its_switches() {
+fn a_board_without_an_extension_lacks_its_register() {
     let config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };
     let host = Host::lenient(config);
     let address = CONTROL_BASE + 0x78;

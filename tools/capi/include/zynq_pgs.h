@@ -249,8 +249,8 @@ uint32_t zpgs_abi_version(void);
 // call fails; `zpgs_last_error` of null then has the text.
 //
 // # Safety
-// `board` is null or a text that ends with a null byte; `accelerator` is null or the address of a
-// pointer.
+// `board` is null or a text that ends with a null byte and that no thread writes during the call;
+// `accelerator` is null or the address of a pointer that no other thread uses during the call.
 enum zpgs_status zpgs_open(const char *board, struct zpgs_accelerator **accelerator);
 
 // Closes an accelerator, and stops a step in flight. Null does nothing.
@@ -268,15 +268,15 @@ enum zpgs_status zpgs_close(struct zpgs_accelerator *accelerator);
 // thread's next call of this kind fails. Never null.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 const char *zpgs_last_error(const struct zpgs_accelerator *accelerator);
 
 // Loads `count` shapes, in place of all earlier ones; bodies refer to them by index. Not while a
 // step is in flight.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed; `shapes` is null or the address of
-// `count` shapes.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns; `shapes` is
+// null or the address of `count` shapes that no thread writes during the call.
 enum zpgs_status zpgs_set_shapes(struct zpgs_accelerator *accelerator,
                                  const struct zpgs_shape *shapes,
                                  size_t count);
@@ -285,11 +285,12 @@ enum zpgs_status zpgs_set_shapes(struct zpgs_accelerator *accelerator,
 // `sizeof(zpgs_parameters)`.
 //
 // # Safety
-// `parameters` is null or the address of `size` bytes.
+// `parameters` is null or the address of `size` bytes that no other thread uses during the call.
 enum zpgs_status zpgs_parameters_default(struct zpgs_parameters *parameters, size_t size);
 
 // The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
-// `pair_friction` of `zpgs_parameters`. The sign is dropped.
+// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite. A
+// count of 0 stays 0.
 uint32_t zpgs_count_with_friction(uint32_t count, float friction);
 
 // Solves the contacts of one time step, and integrates it if the parameters say so. Returns when
@@ -298,9 +299,10 @@ uint32_t zpgs_count_with_friction(uint32_t count, float friction);
 // `report` may be null.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed. Every other pointer is null or the
-// address of its structure, with the size in it; the arrays are as `zpgs_bodies` and
-// `zpgs_collisions` describe.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. Every other
+// pointer is null or the address of its structure, with the size in it. The arrays are as
+// `zpgs_bodies` and `zpgs_collisions` describe. No other thread uses the structures or the arrays
+// during the call.
 enum zpgs_status zpgs_step(struct zpgs_accelerator *accelerator,
                            const struct zpgs_bodies *bodies,
                            const struct zpgs_collisions *collisions,
@@ -317,9 +319,9 @@ enum zpgs_status zpgs_submit(struct zpgs_accelerator *accelerator,
                              const struct zpgs_collisions *collisions,
                              const struct zpgs_parameters *parameters);
 
-// Waits for the step in flight and stores its results in the bodies, which must be those of
-// `zpgs_submit`; their arrays may have moved. Whether it fails or not, no step is in flight
-// afterwards, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
+// Waits for the step in flight and stores its results in `bodies`. The caller gives the bodies of
+// `zpgs_submit`, whose arrays may have moved. Afterwards no step is in flight, also where the call
+// fails, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
 // `ZPGS_STATUS_BUSY`.
 //
 // `report` may be null.
@@ -336,7 +338,7 @@ enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
 // call.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 enum zpgs_status zpgs_cancel(const struct zpgs_accelerator *accelerator);
 
 #ifdef __cplusplus

@@ -1,4 +1,8 @@
 //! The functions of the header, in its order.
+//!
+//! The module exists for exported names and for arguments that are raw pointers: Rust calls both
+//! `unsafe`. No function computes anything here: each hands its pointers to [`memory`], under the
+//! promises of its `# Safety` section.
 
 #![allow(unsafe_code, reason = "exported names, and arguments that are raw pointers")]
 
@@ -45,19 +49,21 @@ pub extern "C" fn zpgs_abi_version() -> u32 {
 /// call fails; `zpgs_last_error` of null then has the text.
 ///
 /// # Safety
-/// `board` is null or a text that ends with a null byte; `accelerator` is null or the address of a
-/// pointer.
+/// `board` is null or a text that ends with a null byte and that no thread writes during the call;
+/// `accelerator` is null or the address of a pointer that no other thread uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_open(
     board: *const c_char,
     accelerator: *mut *mut AcceleratorHandle,
 ) -> Status {
     let open = || {
-        // SAFETY: the caller promises a text.
+        // SAFETY: `board` is null or ends with a null byte, and no thread writes it while `text` is in
+        // use: `# Safety` of this function.
         let board = unsafe { memory::text(board, "text that names the board") }?;
         AcceleratorHandle::open(board)
     };
-    // SAFETY: the caller promises the address of a pointer.
+    // SAFETY: `accelerator` is null or leads to a pointer that this call alone uses: `# Safety` of
+    // this function.
     call(|| unsafe { memory::open_into(accelerator, open) })
 }
 
@@ -67,7 +73,8 @@ pub unsafe extern "C" fn zpgs_open(
 /// `accelerator` is null or from `zpgs_open`, is closed once, and no other thread uses it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_close(accelerator: *mut AcceleratorHandle) -> Status {
-    // SAFETY: the caller promises an open handle that nothing else uses.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, closed for the first time, and used by no
+    // other call from here on: `# Safety` of this function.
     call(|| unsafe { memory::close(accelerator) })
 }
 
@@ -80,10 +87,11 @@ pub unsafe extern "C" fn zpgs_close(accelerator: *mut AcceleratorHandle) -> Stat
 /// thread's next call of this kind fails. Never null.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_last_error(accelerator: *const AcceleratorHandle) -> *const c_char {
-    // SAFETY: the caller promises an open handle.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
     match unsafe { memory::handle(accelerator) } {
         Ok(handle) => handle.text(),
         Err(_) => last_error::get(),
@@ -94,18 +102,20 @@ pub unsafe extern "C" fn zpgs_last_error(accelerator: *const AcceleratorHandle) 
 /// step is in flight.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed; `shapes` is null or the address of
-/// `count` shapes.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns; `shapes` is
+/// null or the address of `count` shapes that no thread writes during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_set_shapes(
     accelerator: *mut AcceleratorHandle,
     shapes: *const Shape,
     count: usize,
 ) -> Status {
-    // SAFETY: the caller promises an open handle.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the caller promises the shapes; a shape takes every bit pattern.
+        // SAFETY: `shapes` is null or leads to `count` initialised shapes that no thread writes during
+        // the call; a shape takes every bit pattern.
         let given = unsafe { memory::slice(shapes, count, "shapes") }?;
         let mut shapes = Vec::new();
         shapes.try_reserve_exact(given.len()).map_err(|error| {
@@ -122,21 +132,22 @@ pub unsafe extern "C" fn zpgs_set_shapes(
 /// `sizeof(zpgs_parameters)`.
 ///
 /// # Safety
-/// `parameters` is null or the address of `size` bytes.
+/// `parameters` is null or the address of `size` bytes that no other thread uses during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_parameters_default(
     parameters: *mut Parameters,
     size: usize,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises the bytes.
+        // SAFETY: `parameters` is null or leads to `size` bytes that this call alone uses.
         unsafe { Out::of_size(parameters, size) }?.write(Parameters::default());
         Ok(())
     })
 }
 
 /// The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
-/// `pair_friction` of `zpgs_parameters`. The sign is dropped.
+/// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite. A
+/// count of 0 stays 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn zpgs_count_with_friction(count: u32, friction: f32) -> u32 {
     count_with_friction(count, friction)
@@ -148,9 +159,10 @@ pub extern "C" fn zpgs_count_with_friction(count: u32, friction: f32) -> u32 {
 /// `report` may be null.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed. Every other pointer is null or the
-/// address of its structure, with the size in it; the arrays are as `zpgs_bodies` and
-/// `zpgs_collisions` describe.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. Every other
+/// pointer is null or the address of its structure, with the size in it. The arrays are as
+/// `zpgs_bodies` and `zpgs_collisions` describe. No other thread uses the structures or the arrays
+/// during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_step(
     accelerator: *mut AcceleratorHandle,
@@ -159,16 +171,21 @@ pub unsafe extern "C" fn zpgs_step(
     parameters: *const Parameters,
     report: *mut Report,
 ) -> Status {
-    // SAFETY: the caller promises an open handle.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the caller promises the structure and its arrays.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
+        // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: the caller promises the structure and its array.
+        // SAFETY: `collisions` is null or leads to its structure; no thread writes the array in it during
+        // the call.
         let collisions = unsafe { read_collisions(collisions) }?;
-        // SAFETY: the caller promises the structure.
+        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
+        // during the call.
         let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
-        // SAFETY: the caller promises the structure, which nothing else uses meanwhile.
+        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
+        // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let parameters = parameters.driver()?;
         let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
@@ -189,22 +206,26 @@ pub unsafe extern "C" fn zpgs_submit(
     collisions: *const CollisionArray,
     parameters: *const Parameters,
 ) -> Status {
-    // SAFETY: the caller promises an open handle.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the caller promises the structure and its arrays.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
+        // and this call alone uses them.
         let bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: the caller promises the structure and its array.
+        // SAFETY: `collisions` is null or leads to its structure; no thread writes the array in it during
+        // the call.
         let collisions = unsafe { read_collisions(collisions) }?;
-        // SAFETY: the caller promises the structure.
+        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
+        // during the call.
         let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
         state.submit(&bodies, &collisions, &parameters.driver()?)
     })
 }
 
-/// Waits for the step in flight and stores its results in the bodies, which must be those of
-/// `zpgs_submit`; their arrays may have moved. Whether it fails or not, no step is in flight
-/// afterwards, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
+/// Waits for the step in flight and stores its results in `bodies`. The caller gives the bodies of
+/// `zpgs_submit`, whose arrays may have moved. Afterwards no step is in flight, also where the call
+/// fails, unless the status is `ZPGS_STATUS_NULL_POINTER`, `ZPGS_STATUS_ARGUMENT` or
 /// `ZPGS_STATUS_BUSY`.
 ///
 /// `report` may be null.
@@ -217,12 +238,15 @@ pub unsafe extern "C" fn zpgs_wait(
     bodies: *const BodyArrays,
     report: *mut Report,
 ) -> Status {
-    // SAFETY: the caller promises an open handle.
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the caller promises the structure and its arrays.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
+        // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: the caller promises the structure, which nothing else uses meanwhile.
+        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
+        // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let done = state.wait(&mut bodies)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
@@ -236,11 +260,12 @@ pub unsafe extern "C" fn zpgs_wait(
 /// call.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> Status {
     call(|| {
-        // SAFETY: the caller promises an open handle.
+        // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+        // returns: `# Safety` of this function.
         unsafe { memory::handle(accelerator) }?.cancel();
         Ok(())
     })
@@ -261,9 +286,9 @@ unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure>
         angular_velocities: NONE,
         shapes: StridedConst { data: std::ptr::null(), stride: 0 },
     };
-    // SAFETY: the caller promises the structure.
+    // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
     let arrays = unsafe { memory::read(pointer, nothing) }?;
-    // SAFETY: the caller promises its arrays.
+    // SAFETY: the arrays are as the structure describes: `# Safety` of this function.
     unsafe { BodiesView::new(arrays) }
 }
 
@@ -275,8 +300,8 @@ unsafe fn read_collisions<'a>(
     pointer: *const CollisionArray,
 ) -> Result<CollisionsView<'a>, Failure> {
     let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };
-    // SAFETY: the caller promises the structure.
+    // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
     let array = unsafe { memory::read(pointer, CollisionArray { size: 0, count: 0, collisions }) }?;
-    // SAFETY: the caller promises its array.
+    // SAFETY: the array is as the structure describes: `# Safety` of this function.
     unsafe { CollisionsView::new(array) }
 }

@@ -65,33 +65,19 @@ pub(crate) struct BuildArgs {
 impl BuildArgs {
     /// The build that the options describe.
     pub(crate) fn build(&self) -> Build {
-        let Self {
-            profile,
-            format,
-            arithmetic,
-            inertia,
-            hazards,
-            window,
-            subnormals,
-            bandwidth,
-            length_width,
-            address_width,
-            threads,
-            lanes,
-        } = *self;
         Build {
-            profile,
-            format,
-            arithmetic,
-            inertia,
-            hazards,
-            window,
-            subnormals,
-            bandwidth,
-            length_width,
-            address_width,
-            threads,
-            lanes,
+            profile: self.profile,
+            format: self.format,
+            arithmetic: self.arithmetic,
+            inertia: self.inertia,
+            hazards: self.hazards,
+            window: self.window,
+            subnormals: self.subnormals,
+            bandwidth: self.bandwidth,
+            length_width: self.length_width,
+            address_width: self.address_width,
+            threads: self.threads,
+            lanes: self.lanes,
         }
     }
 }
