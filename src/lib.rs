@@ -107,7 +107,7 @@ pub use platform::{
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
+    Impulses, Pose, Shape, ShapeError, StepParameters, Structures, Velocity, WarmCollisions,
 };
 pub use step::{
     Accelerator, Detached, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles,

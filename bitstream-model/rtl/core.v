@@ -104,7 +104,7 @@ module core (
 
   wire [31:0] per_second, speed_limit, half_step, series;
   wire [95:0] gravity_step;
-  constants numbers (
+  constants #(.SMALLEST_NORMAL(DESIGN_SMALLEST_NORMAL)) numbers (
     .clk(clk), .start(start), .time_step(time_step),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
     .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step), .series(series),

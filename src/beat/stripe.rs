@@ -25,7 +25,7 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, pose, result};
+use pgs_interface::record::{LANES, collision, pose, result};
 use pgs_interface::stripe::Stripe;
 
 /// The records that a segment carries.
@@ -35,6 +35,8 @@ pub(crate) enum Segment {
     Velocities,
     /// Collisions.
     Collisions,
+    /// Collisions of a warm pass, with their impulses.
+    WarmCollisions,
     /// Pose of each body.
     Poses,
     /// New state of each body.
@@ -68,6 +70,11 @@ impl Segment {
         let (rows, format, stripe) = match self {
             Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.velocities),
             Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
+            Self::WarmCollisions => match stripes.warm_collisions {
+                Some(stripe) => (collision::WARM_ROWS, numbers.collisions, stripe),
+                // No step of this design has such a pass.
+                None => (variant.collision_rows(), numbers.collisions, stripes.collisions),
+            },
             Self::Poses => (pose::ROWS, numbers.poses, stripes.poses),
             Self::Results => (result::ROWS, numbers.poses, stripes.results),
         };
@@ -106,6 +113,12 @@ impl Layout {
         let channel = usize::from(group[at]);
         let slot = beat / group.len() * share(group, channel) + share(&group[..at], channel);
         Place { channel, slot }
+    }
+
+    /// The rows of a record, one a beat, whose beats go to a channel. Every record is a whole group.
+    pub(crate) fn rows_on(&self, channel: usize) -> impl Iterator<Item = usize> + use<> {
+        let streams = self.stripe.streams.iter().cycle().take(self.rows).enumerate();
+        streams.filter(move |(_, stream)| usize::from(**stream) == channel).map(|(row, _)| row)
     }
 
     /// The beat of the segment that goes to a place of one of its channels.

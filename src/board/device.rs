@@ -240,7 +240,7 @@ impl Device {
         parameters: &StepParameters,
     ) -> Result<(), Symptom> {
         let largest = self.largest;
-        let outline = Outline::new(plan, parameters, largest);
+        let outline = Outline::new(plan, largest);
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
@@ -256,9 +256,9 @@ impl Device {
                 port.queue(bank, bytes(beats.start), bytes(beats.len()), largest)
             };
             queue(&segments.velocities)?;
-            if !segments.collisions.is_empty() {
-                for _ in 0..plan.rounds() {
-                    queue(&segments.collisions)?;
+            if plan.collisions > 0 {
+                for pass in 0..plan.rounds() {
+                    queue(segments.of_pass(pass, plan.passes))?;
                 }
             }
             queue(&segments.poses)?;

@@ -5,42 +5,50 @@ use pgs_interface::profile::Flow;
 use super::plan::{Plan, bytes};
 use crate::axi_dma::pieces;
 use crate::fault::Phase;
-use crate::scene::StepParameters;
 
 /// The layout of a step's descriptors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Outline {
     plan: Plan,
-    contact_passes: u32,
     /// The longest piece that a descriptor carries, bytes.
     largest: u32,
 }
 
 impl Outline {
     /// The outline of a step whose descriptors carry at most `largest` bytes.
-    pub(crate) fn new(plan: &Plan, parameters: &StepParameters, largest: u32) -> Self {
-        Self { plan: *plan, contact_passes: parameters.contact_iterations, largest }
+    pub(crate) fn new(plan: &Plan, largest: u32) -> Self {
+        Self { plan: *plan, largest }
     }
 
     /// The phase of a descriptor of an MM2S channel; results, for an index past the last.
     pub(crate) fn phase_of(&self, channel: usize, descriptor: usize) -> Phase {
         let segments = self.plan.segments(channel);
         let count = |beats: usize| pieces(bytes(beats), self.largest).count();
-        let (load, a_pass) = (count(segments.velocities.len()), count(segments.collisions.len()));
-        let Some(behind_load) = descriptor.checked_sub(load) else { return Phase::Load };
-        let round = behind_load.checked_div(a_pass).and_then(|round| u32::try_from(round).ok());
-        if let Some(round) = round.filter(|round| u64::from(*round) < self.plan.rounds()) {
-            return match self.plan.variant.profile.flow {
-                Flow::Window(_) => Phase::Collisions,
-                Flow::Passes => match round.checked_sub(self.contact_passes) {
-                    None => Phase::Contact(round + 1),
-                    Some(friction) => Phase::Friction(friction + 1),
-                },
-            };
+        let load = count(segments.velocities.len());
+        let Some(mut behind) = descriptor.checked_sub(load) else { return Phase::Load };
+        for pass in 0..self.plan.rounds() {
+            let of_pass = count(segments.of_pass(pass, self.plan.passes).len());
+            match behind.checked_sub(of_pass) {
+                None => return self.phase_of_pass(pass),
+                // No pass of this channel has a descriptor.
+                Some(_) if of_pass == 0 => break,
+                Some(rest) => behind = rest,
+            }
         }
         match descriptor < self.plan.descriptors(channel, self.largest) {
             true => Phase::Poses,
             false => Phase::Results,
+        }
+    }
+
+    fn phase_of_pass(&self, pass: u64) -> Phase {
+        let pass = u32::try_from(pass).unwrap_or(u32::MAX);
+        match self.plan.variant.profile.flow {
+            Flow::Window(_) => Phase::Collisions,
+            Flow::Passes => match pass.checked_sub(self.plan.passes.contact) {
+                None => Phase::Contact(pass + 1),
+                Some(friction) => Phase::Friction(friction + 1),
+            },
         }
     }
 }
@@ -48,17 +56,13 @@ impl Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Passes;
     use pgs_interface::profile::{FLOAT, WINDOWED};
 
     fn outline(variant: pgs_interface::profile::Variant, collisions: usize) -> Outline {
-        let plan = Plan { bodies: 8, collisions, passes: 5, variant };
-        let parameters = StepParameters {
-            contact_iterations: 3,
-            friction_iterations: 2,
-            ..StepParameters::default()
-        };
+        let passes = Passes { contact: 3, friction: 2, ..Passes::default() };
         // One beat a descriptor.
-        Outline::new(&plan, &parameters, 16)
+        Outline::new(&Plan { bodies: 8, collisions, passes, variant }, 16)
     }
 
     #[test]

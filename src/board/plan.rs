@@ -3,21 +3,26 @@
 //!
 //! ```text
 //! MM2S buffer of a channel: | velocities | poses | collisions |    each from a multiple of 64 bytes
+//! ... that carries impulses: | velocities | poses | collisions | warm contact | warm friction |
+//! S2MM buffer of a channel: | impulses | results |
 //! ```
 //!
-//! Collisions come last, so that a step may have fewer of them than its buffers have room for.
+//! Collisions come last, so that a step may have fewer of them than its buffers have room for. In a
+//! warm pass one channel carries an impulse behind each collision's beats; the others send what they
+//! send in every other pass.
 
 use std::ops::Range;
 use std::time::Duration;
 
 use pgs_interface::profile::{Flow, Variant};
 use pgs_interface::record::BEAT_BYTES;
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 use crate::axi_dma::pieces;
 use crate::beat::stripe::Segment;
 use crate::control_block::Capabilities;
 use crate::control_block::time_of;
-use crate::scene::StepParameters;
+use crate::scene::{Passes, StepParameters};
 
 /// A memory slower than 100 MB/s counts as one that does not answer.
 const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;
@@ -31,7 +36,7 @@ pub(crate) struct Plan {
     pub(crate) bodies: usize,
     /// Records of collisions, padding included.
     pub(crate) collisions: usize,
-    pub(crate) passes: u64,
+    pub(crate) passes: Passes,
     /// Profile and formats: they decide how records lie on the channels.
     pub(crate) variant: Variant,
 }
@@ -42,16 +47,28 @@ pub(crate) struct Segments {
     pub(crate) velocities: Range<usize>,
     pub(crate) poses: Range<usize>,
     pub(crate) collisions: Range<usize>,
+    /// The collisions of the warm contact pass, where this channel carries impulses in it.
+    pub(crate) warm_contact: Option<Range<usize>>,
+    /// Of the warm friction pass, likewise.
+    pub(crate) warm_friction: Option<Range<usize>>,
 }
 
 impl Segments {
     /// Beats up to the end of the last segment.
-    pub(crate) const fn end(&self) -> usize {
-        if self.collisions.start == self.collisions.end {
-            self.poses.end
-        } else {
-            self.collisions.end
-        }
+    pub(crate) fn end(&self) -> usize {
+        let parts = [&self.warm_friction, &self.warm_contact].map(Option::as_ref);
+        let mut parts = parts.into_iter().flatten().chain([&self.collisions, &self.poses]);
+        parts.find(|part| !part.is_empty()).map_or(self.velocities.end, |part| part.end)
+    }
+
+    /// The collisions of one of the passes, counted over both kinds from 0.
+    pub(crate) fn of_pass(&self, pass: u64, passes: Passes) -> &Range<usize> {
+        let warm = match passes.is_warm(pass) {
+            true if pass < u64::from(passes.contact) => self.warm_contact.as_ref(),
+            true => self.warm_friction.as_ref(),
+            false => None,
+        };
+        warm.unwrap_or(&self.collisions)
     }
 }
 
@@ -69,8 +86,8 @@ impl Plan {
     /// How often the collisions are streamed.
     pub(crate) fn rounds(&self) -> u64 {
         match self.variant.profile.flow {
-            Flow::Passes => self.passes,
-            Flow::Window(_) => self.passes.min(1),
+            Flow::Passes => self.passes.total(),
+            Flow::Window(_) => self.passes.total().min(1),
         }
     }
 
@@ -83,29 +100,65 @@ impl Plan {
         let velocities = place(Segment::Velocities, self.bodies, 0);
         let poses = place(Segment::Poses, self.bodies, velocities.end);
         let collisions = place(Segment::Collisions, self.collisions, poses.end);
-        Segments { velocities, poses, collisions }
+        let mut end = collisions.end;
+        let mut warm = |passes: u32| {
+            (passes > 0 && self.carries_impulses(channel)).then(|| {
+                let placed = place(Segment::WarmCollisions, self.collisions, end);
+                end = placed.end;
+                placed
+            })
+        };
+        let (warm_contact, warm_friction) = (warm(self.passes.contact), warm(self.passes.friction));
+        Segments { velocities, poses, collisions, warm_contact, warm_friction }
     }
 
-    /// Beats of results on one S2MM channel.
+    /// Whether an MM2S channel carries the impulses of a warm start.
+    pub(crate) fn carries_impulses(&self, channel: usize) -> bool {
+        let beats = |segment: Segment| segment.layout(&self.variant).beats_on_channel(1, channel);
+        self.passes.warm && beats(Segment::WarmCollisions) != beats(Segment::Collisions)
+    }
+
+    /// Beats of impulses on one S2MM channel, in front of the results.
+    pub(crate) fn impulses(&self, channel: usize) -> usize {
+        if channel == IMPULSES_STREAM { self.collisions * self.passes.kinds_out() } else { 0 }
+    }
+
+    /// Beats of results on one S2MM channel, with the impulses in front of them.
     pub(crate) fn results(&self, channel: usize) -> usize {
-        Segment::Results.layout(&self.variant).beats_on_channel(self.bodies, channel)
+        self.impulses(channel)
+            + Segment::Results.layout(&self.variant).beats_on_channel(self.bodies, channel)
     }
 
     /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
     pub(crate) fn descriptors(&self, channel: usize, largest: u32) -> usize {
         let count = |range: Range<usize>| pieces(bytes(range.len()), largest).count();
-        let Segments { velocities, poses, collisions } = self.segments(channel);
-        let rounds = usize::try_from(self.rounds()).unwrap_or(usize::MAX);
-        (count(velocities) + count(poses)).saturating_add(count(collisions).saturating_mul(rounds))
+        let segments = self.segments(channel);
+        let warm = |part: &Option<Range<usize>>| part.clone().map(count);
+        let (contact, friction) = (warm(&segments.warm_contact), warm(&segments.warm_friction));
+        let others = self.rounds() - self.warm_rounds(&segments);
+        let others = usize::try_from(others).unwrap_or(usize::MAX);
+        (count(segments.velocities) + count(segments.poses))
+            .saturating_add(count(segments.collisions).saturating_mul(others))
+            .saturating_add(contact.unwrap_or(0) + friction.unwrap_or(0))
+    }
+
+    /// The passes in which a channel carries impulses.
+    fn warm_rounds(&self, segments: &Segments) -> u64 {
+        let Segments { warm_contact, warm_friction, .. } = segments;
+        u64::from(warm_contact.is_some()) + u64::from(warm_friction.is_some())
     }
 
     /// Bytes streamed to the accelerator, all channels.
     pub(crate) fn bytes_to_device(&self) -> u64 {
         (0..self.channels())
             .map(|channel| {
-                let Segments { velocities, poses, collisions } = self.segments(channel);
+                let segments = self.segments(channel);
+                let others = self.rounds() - self.warm_rounds(&segments);
+                let Segments { velocities, poses, collisions, warm_contact, warm_friction } = segments;
+                let warm = [warm_contact, warm_friction].into_iter().flatten();
                 bytes(velocities.len() + poses.len())
-                    .saturating_add(bytes(collisions.len()).saturating_mul(self.rounds()))
+                    .saturating_add(bytes(collisions.len()).saturating_mul(others))
+                    .saturating_add(bytes(warm.map(|part| part.len()).sum()))
             })
             .fold(0, u64::saturating_add)
     }
@@ -126,7 +179,7 @@ impl Plan {
         parameters.deadline.unwrap_or_else(|| {
             let window = capabilities.contact.window.max(capabilities.friction.window);
             let cycles = 4u64
-                .saturating_mul(self.passes)
+                .saturating_mul(self.passes.total())
                 .saturating_mul(self.collisions as u64)
                 .saturating_mul(u64::from(capabilities.initiation_interval) + u64::from(window));
             let bytes = self.bytes_to_device().saturating_add(self.bytes_from_device());
@@ -147,7 +200,8 @@ mod tests {
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
 
     const FOUR: Plan =
-        Plan { bodies: 38_881, collisions: 127_746, passes: 8, variant: FLOAT.default_variant() };
+        Plan { bodies: 38_881, collisions: 127_746, passes: PASSES, variant: FLOAT.default_variant() };
+    const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
     #[test]
     fn a_wide_length_register_takes_ten_descriptors_a_channel() {
@@ -210,7 +264,7 @@ mod tests {
         assert_eq!(plan.bytes_from_device(), 16 * 4 * 38_880);
         let counts: Vec<_> = (0..4).map(|channel| plan.descriptors(channel, 67_108_800)).collect();
         assert_eq!(counts, [1, 1, 1, 1]);
-        let none = Plan { passes: 0, ..plan };
+        let none = Plan { passes: Passes::default(), ..plan };
         assert_eq!(none.bytes_to_device(), 16 * 4 * 38_880);
     }
 
@@ -218,7 +272,8 @@ mod tests {
     fn an_odd_collision_of_half_is_paid_for_as_a_pair() {
         let bytes = |collisions| {
             let variant = HALF.default_variant();
-            let plan = Plan { bodies: 5, collisions, passes: 1, variant };
+            let passes = Passes { contact: 1, ..Passes::default() };
+            let plan = Plan { bodies: 5, collisions, passes, variant };
             plan.bytes_to_device()
         };
         assert_eq!(bytes(3), bytes(4));

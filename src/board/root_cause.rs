@@ -16,8 +16,8 @@ impl Device {
     /// Finds the cause of a failure: the fault, and the state of the board, unless the board had no
     /// part in it.
     pub(crate) fn diagnose(&mut self, symptom: Symptom) -> (Fault, Option<Box<Diagnosis>>) {
-        use Fault::{Cancelled, NoMemory, NotFinite};
-        if let Symptom::Known(fault @ (NotFinite { .. } | NoMemory(_))) = symptom {
+        use Fault::{Cancelled, ImpulseNotFinite, NoMemory, NotFinite};
+        if let Symptom::Known(fault @ (NotFinite { .. } | ImpulseNotFinite { .. } | NoMemory(_))) = symptom {
             return (fault, None);
         }
         if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {

@@ -48,7 +48,9 @@ fn arguments(
 fn flags_of(parameters: &StepParameters) -> u32 {
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
-    flags::PAIR_FRICTION.put(word, parameters.pair_friction.into())
+    let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
+    let word = flags::WARM_START.put(word, parameters.warm_start.into());
+    flags::IMPULSES_OUT.put(word, parameters.impulses_out.into())
 }
 
 /// The accelerator's control block.

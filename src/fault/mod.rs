@@ -139,6 +139,15 @@ pub enum Fault {
         /// The first such body.
         body: usize,
     },
+    /// An impulse that came out is not a number.
+    #[error(
+        "the impulses of collision {collision} are not finite: the scene diverges (shorten the time \
+         step), or the accelerator computes wrongly"
+    )]
+    ImpulseNotFinite {
+        /// The first such collision.
+        collision: usize,
+    },
     /// Registers read all ones.
     #[error(
         "{region} reads all ones: is the bitstream still loaded, its power on and its clock running?"
@@ -209,6 +218,7 @@ impl Fault {
             Self::Cancelled => "cancelled",
             Self::Checksum { .. } => "checksum",
             Self::NotFinite { .. } => "not-finite",
+            Self::ImpulseNotFinite { .. } => "impulse-not-finite",
             Self::Gone { .. }
             | Self::Core(DmaError::Gone { .. })
             | Self::Control(ControlError::Gone) => "gone",

@@ -1,6 +1,6 @@
 //! Holds an order: the collision of each entry, and the empty entries.
 
-use crate::scene::{Collision, Collisions, Structures};
+use crate::scene::{Collision, Collisions, Impulses, Structures};
 
 /// The value of an empty entry. No collision has this index, because the number of collisions is
 /// smaller.
@@ -113,6 +113,11 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     #[inline]
     fn prefetch(&self, index: usize) {
         self.schedule.get(index).into_iter().for_each(|index| self.collisions.prefetch(index));
+    }
+
+    #[inline]
+    fn impulses(&self, index: usize) -> Impulses {
+        self.schedule.get(index).map_or(Impulses::ZERO, |index| self.collisions.impulses(index))
     }
 
     fn lengths_agree(&self) -> bool {

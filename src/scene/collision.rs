@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use half::f16;
 use pgs_interface::record::collision as layout;
 
-use super::Structures;
+use super::{Impulses, Structures};
 use crate::simd::prefetch;
 
 /// One point at which two bodies touch.
@@ -152,6 +152,14 @@ pub trait Collisions: Sync {
     /// collisions.
     fn lengths_agree(&self) -> bool {
         true
+    }
+
+    /// The impulses with which collision `index` begins in a step with
+    /// [`StepParameters::warm_start`](crate::StepParameters::warm_start); `index` is below
+    /// [`len`](Self::len).
+    fn impulses(&self, index: usize) -> Impulses {
+        let _ = index;
+        Impulses::ZERO
     }
 }
 

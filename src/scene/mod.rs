@@ -2,6 +2,7 @@
 
 mod body;
 mod collision;
+mod impulses;
 mod order;
 mod parameters;
 mod shape;
@@ -9,7 +10,9 @@ mod structures;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
+pub use impulses::{Impulses, WarmCollisions};
 pub use order::{Order, Ties};
+pub(crate) use parameters::Passes;
 pub use parameters::StepParameters;
 pub use shape::{Shape, ShapeError};
 pub use structures::Structures;

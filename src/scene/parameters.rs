@@ -135,6 +135,14 @@ pub struct StepParameters {
     /// the pose by it, without damping and gravity: platforms, doors, conveyors. Collisions of such
     /// a body are no hazard, whatever their number. Without it a static body must be at rest.
     pub kinematic: bool,
+    /// Whether the step begins with the [impulses](crate::Collisions::impulses) that come with the
+    /// collisions, in place of none: piles and towers then need fewer passes. Each kind of pass with
+    /// iterations takes one more pass in front of the others, which applies the impulses.
+    pub warm_start: bool,
+    /// Whether the impulses of the step come out
+    /// ([`Accelerator::impulses`](crate::Accelerator::impulses)), for the next step's warm start, for
+    /// sounds or for damage. They cost no pass.
+    pub impulses_out: bool,
     /// Order in which the collisions are sent; `None` is the cheapest order on the board at hand:
     ///
     /// | the pipeline | order |
@@ -171,10 +179,50 @@ pub struct StepParameters {
     pub retries: u32,
 }
 
+/// The passes of a step over its collisions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Passes {
+    /// Contact passes, with the warm one.
+    pub(crate) contact: u32,
+    /// Friction passes, with the warm one.
+    pub(crate) friction: u32,
+    /// Whether the first pass of each kind brings the impulses to begin with.
+    pub(crate) warm: bool,
+    /// Whether the impulses go out.
+    pub(crate) impulses_out: bool,
+}
+
+impl Passes {
+    /// The number of passes of both kinds.
+    pub(crate) const fn total(self) -> u64 {
+        self.contact as u64 + self.friction as u64
+    }
+
+    /// Whether a pass, counted over both kinds from 0, brings impulses.
+    pub(crate) const fn is_warm(self, pass: u64) -> bool {
+        self.warm && (pass == 0 || pass == self.contact as u64)
+    }
+
+    /// The number of kinds whose impulses go out.
+    pub(crate) const fn kinds_out(self) -> usize {
+        match self.impulses_out {
+            true => (self.contact > 0) as usize + (self.friction > 0) as usize,
+            false => 0,
+        }
+    }
+}
+
 impl StepParameters {
-    /// Passes over the collisions, of both kinds.
-    pub(crate) const fn passes(&self) -> u64 {
-        self.contact_iterations as u64 + self.friction_iterations as u64
+    /// Passes over the collisions.
+    pub(crate) fn passes(&self) -> Passes {
+        let Self { warm_start: warm, impulses_out, .. } = *self;
+        let of = |iterations: u32| iterations.saturating_add(u32::from(warm && iterations > 0));
+        Passes {
+            contact: of(self.contact_iterations),
+            friction: of(self.friction_iterations),
+            warm,
+            impulses_out,
+        }
     }
 }
 
@@ -193,6 +241,8 @@ impl Default for StepParameters {
             friction_iterations: 4,
             integrate: true,
             kinematic: false,
+            warm_start: false,
+            impulses_out: false,
             order: None,
             verify_order: false,
             deadline: None,
@@ -283,6 +333,18 @@ impl StepParameters {
     #[must_use]
     pub const fn with_kinematic(self, kinematic: bool) -> Self {
         Self { kinematic, ..self }
+    }
+
+    /// Sets whether the step begins with [impulses](Self::warm_start).
+    #[must_use]
+    pub const fn with_warm_start(self, warm_start: bool) -> Self {
+        Self { warm_start, ..self }
+    }
+
+    /// Sets whether the [impulses come out](Self::impulses_out).
+    #[must_use]
+    pub const fn with_impulses_out(self, impulses_out: bool) -> Self {
+        Self { impulses_out, ..self }
     }
 
     /// Sets the [order](Self::order) of the collisions; `None` is the cheapest on the board at hand.

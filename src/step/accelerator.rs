@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use pgs_support::float_env::standard;
 
+use super::impulses::ImpulsesOut;
 use super::in_flight::{Flight, InFlight, Started};
 use super::ordering::Ordering;
 use super::pack::{Engines, PackedStep};
@@ -25,7 +26,7 @@ use crate::control_block::Capabilities;
 use crate::error::{Error, OpenError};
 use crate::platform::{Deadline, System};
 use crate::record::result::Record;
-use crate::scene::{Bodies, Collisions, Shape, StepParameters};
+use crate::scene::{Bodies, Collisions, Impulses, Shape, StepParameters};
 use crate::validate::{Limits, validate_shapes};
 
 /// Finds the board that the options ask for.
@@ -54,6 +55,7 @@ pub struct Accelerator {
     /// Results of a step until all are checked. The memory is kept, so that a step allocates
     /// nothing.
     pub(super) staged: Vec<Record>,
+    pub(super) impulses: ImpulsesOut,
 }
 
 /// Prints the board and a summary of the step in each bank, but no records, results or tables:
@@ -110,6 +112,7 @@ impl Accelerator {
             orderings: PerBank::default(),
             detached: None,
             staged: Vec::new(),
+            impulses: ImpulsesOut::default(),
         }
     }
 
@@ -175,6 +178,14 @@ impl Accelerator {
         report.register_reads = counts.reads() - reads;
         report.register_writes = counts.writes() - writes;
         Ok(report)
+    }
+
+    /// The impulses of each collision, in the caller's order, of the last step that succeeded and
+    /// [gave them out](StepParameters::impulses_out); empty before the first. An empty collision has
+    /// zeros.
+    #[must_use]
+    pub fn impulses(&self) -> &[Impulses] {
+        &self.impulses.committed
     }
 
     /// Starts a [step](Self::step) and returns at once. The caller may do other work until it asks

@@ -17,7 +17,7 @@ use crate::board::symptom::Symptom;
 use crate::error::Error;
 use crate::order::{Ordered, Schedule};
 use crate::platform::{Deadline, PlatformError};
-use crate::scene::{Body, Collision, StepParameters};
+use crate::scene::{Body, Collision, Passes, StepParameters};
 
 /// Time limit of an echo. The driver polls without an interrupt after a quarter of it.
 pub(crate) const ECHO_LIMIT: Duration = Duration::from_millis(200);
@@ -101,7 +101,7 @@ impl Accelerator {
         };
         let (sent, _) = self.device.pack(&plan, bank, &input);
         let parameters = StepParameters {
-            contact_iterations: u32::from(plan.passes > 0),
+            contact_iterations: plan.passes.contact,
             friction_iterations: 0,
             integrate: false,
             deadline: Some(ECHO_LIMIT),
@@ -141,6 +141,7 @@ fn plan(bodies: usize, variant: Variant) -> Plan {
         Flow::Passes => (0, 0),
         Flow::Window(_) => (bodies.next_multiple_of(profile.collisions_per_issue as usize), 1),
     };
+    let passes = Passes { contact: passes, ..Passes::default() };
     Plan { bodies, collisions, passes, variant }
 }
 

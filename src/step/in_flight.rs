@@ -6,12 +6,13 @@ use super::accelerator::Accelerator;
 use super::locate::locate;
 use super::pack::PackedStep;
 use super::report::{HostTimes, StepCycles, StepReport};
-use super::results::{check_received, commit, commit_velocities, read};
+use super::results::{check_received, commit, commit_velocities, impulses_of, read};
 use super::stopwatch::Stopwatch;
 use crate::board::symptom::Symptom;
 use crate::control_block::{Counters, Saturated};
 use crate::error::Error;
 use crate::fault::Fault;
+use crate::order::Schedule;
 use crate::platform::Deadline;
 use crate::scene::Bodies;
 use crate::validate::InputError;
@@ -130,12 +131,20 @@ impl<'a> InFlight<'a> {
         bodies: &B,
     ) -> Result<(), Fault> {
         let Self { accelerator, flight } = self;
-        let PackedStep { plan, bank, order_summary, .. } = &flight.step;
-        let Accelerator { device, orderings, staged, .. } = &mut **accelerator;
+        let PackedStep { plan, bank, order_summary, given, .. } = &flight.step;
+        let Accelerator { device, orderings, staged, impulses, .. } = &mut **accelerator;
         let lives = order_summary.live.map(|_| orderings[*bank].lives());
+        let schedule = order_summary.scheduled.then(|| orderings[*bank].schedule());
+        let collision_of =
+            |entry| schedule.map_or(Some(entry), |schedule: &Schedule| schedule.get(entry));
+        let of_impulses = impulses_of(&device.s2mm, plan, *bank);
+        let (impulse_sum, broken) = impulses.read(plan, of_impulses, *given, collision_of);
         // A step that was not started has no sums.
-        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum);
+        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum.wrapping_sub(impulse_sum));
         read(device, staged, (plan, *bank), bodies, lives, sent_sum)?;
+        if let Some(collision) = broken {
+            return Err(Fault::ImpulseNotFinite { collision });
+        }
         flight.step.host.unpack = flight.watch.lap();
         Ok(())
     }
@@ -150,6 +159,9 @@ impl<'a> InFlight<'a> {
         match flight.step.parameters.integrate {
             true => commit(&accelerator.staged, bodies),
             false => commit_velocities(&accelerator.staged, bodies),
+        }
+        if flight.step.parameters.impulses_out {
+            accelerator.impulses.commit();
         }
         flight.step.host.commit = flight.watch.lap();
         let mut report = ended.report;
@@ -203,7 +215,7 @@ impl<'a> InFlight<'a> {
             empty: *empty as u64,
             verified: order_summary.verified,
             live: order_summary.live,
-            passes: u32::try_from(plan.passes).unwrap_or(u32::MAX),
+            passes: u32::try_from(plan.passes.total()).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.accelerator.device.capabilities.clock_khz,
             bytes_to_device: plan.bytes_to_device(),

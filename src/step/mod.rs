@@ -3,6 +3,7 @@
 mod accelerator;
 mod detached;
 mod echo;
+mod impulses;
 mod in_flight;
 mod locate;
 mod ordering;

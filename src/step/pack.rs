@@ -29,7 +29,9 @@ pub(super) struct PackedStep {
     pub(super) parameters: StepParameters,
     /// Number of the caller's bodies.
     pub(super) bodies: usize,
-    /// Number of the caller's collisions with contact points.
+    /// Number of the caller's collisions.
+    pub(super) given: usize,
+    /// Number of them with contact points.
     pub(super) collisions: usize,
     /// Empty entries that are sent.
     pub(super) empty: usize,
@@ -177,6 +179,7 @@ impl Accelerator {
             sent,
             parameters: *parameters,
             bodies: bodies.len(),
+            given,
             collisions: given.saturating_sub(without_points),
             empty: paddings,
             order_summary,

@@ -1,12 +1,16 @@
 //! Writes the records of a step into the buffers of its ports.
 
+use std::ops::Range;
+
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
 use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
 use crate::beat::pack::collisions::{Entries, Seen, pack_collisions};
+use crate::beat::pack::impulses::{WarmSegments, WarmSums, pack_warm};
 use crate::beat::pack::target::Target;
 use crate::beat::pack::writer::{Writer, Written};
+use crate::beat::stripe::Segment;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
@@ -22,6 +26,8 @@ use crate::validate::Quick;
 pub(super) struct SentSums {
     pub(super) velocities: u32,
     pub(super) collisions: u32,
+    /// Of the impulses alone.
+    pub(super) warm: WarmSums,
     pub(super) poses: u32,
 }
 
@@ -51,7 +57,7 @@ impl Device {
         input: &PackInput<'_, B, C>,
     ) -> (SentSums, Seen) {
         let PackInput { bodies, collisions, added, lives, shapes, quick, kinematic } = *input;
-        let SegmentBuffers { mut velocities, mut poses, mut entries } =
+        let SegmentBuffers { mut velocities, mut poses, mut entries, warm } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
@@ -78,7 +84,13 @@ impl Device {
         let (collisions, mut seen) =
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
         seen.good &= bodies_passed;
-        (SentSums { velocities, collisions, poses }, seen)
+        let warm = warm.map_or(WarmSums::default(), |(channel, segments)| {
+            let layout = Segment::WarmCollisions.layout(&plan.variant);
+            let entries = (of_entries.collisions, of_entries.count);
+            pack_warm(&layout, channel, self.ends.ends(), entries, segments)
+        });
+        seen.good &= !warm.broken;
+        (SentSums { velocities, collisions, warm, poses }, seen)
     }
 
     /// Writes the records of a step whose collisions `narrow_phase` writes one after the other.
@@ -98,7 +110,7 @@ impl Device {
             narrow_phase(&mut writer);
             return Ok((None, writer.finish()?));
         }
-        let SegmentBuffers { mut velocities, mut poses, mut entries } =
+        let SegmentBuffers { mut velocities, mut poses, mut entries, .. } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
@@ -116,7 +128,8 @@ impl Device {
         let mut writer = Writer::new(target, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let written = writer.finish()?;
-        Ok((Some(SentSums { velocities, collisions: written.sum, poses }), written))
+        let warm = WarmSums::default();
+        Ok((Some(SentSums { velocities, collisions: written.sum, warm, poses }), written))
     }
 }
 
@@ -131,6 +144,8 @@ struct SegmentBuffers<'a> {
     velocities: [&'a mut [Beat]; DMA_COUNT_MAX],
     poses: [&'a mut [Beat]; DMA_COUNT_MAX],
     entries: [&'a mut [Beat]; DMA_COUNT_MAX],
+    /// The channel that carries impulses, and its segments of the warm passes.
+    warm: Option<(usize, WarmSegments<'a>)>,
 }
 
 impl<'a> SegmentBuffers<'a> {
@@ -139,17 +154,43 @@ impl<'a> SegmentBuffers<'a> {
         type Channels<'a> = [&'a mut [Beat]; DMA_COUNT_MAX];
         let (mut velocities, mut poses, mut entries) =
             <(Channels<'_>, Channels<'_>, Channels<'_>)>::default();
+        let mut warm = None;
         for (place, port) in ports.iter_mut().enumerate() {
             let segments = plan.segments(place);
-            let beats = &mut port.beats_mut(bank)[..segments.end()];
-            let (first, beats) = beats.split_at_mut(segments.poses.start);
-            let (second, third) = beats.split_at_mut(segments.poses.len());
-            velocities[place] = &mut first[segments.velocities];
-            poses[place] = second;
-            if !segments.collisions.is_empty() {
-                entries[place] = &mut third[segments.collisions.start - segments.poses.end..];
+            let mut rest = Rest { beats: &mut port.beats_mut(bank)[..segments.end()], at: 0 };
+            velocities[place] = rest.take(&segments.velocities);
+            poses[place] = rest.take(&segments.poses);
+            entries[place] = rest.take(&segments.collisions);
+            if plan.carries_impulses(place) {
+                let mut taken = |part: &Option<Range<usize>>| {
+                    part.as_ref().map(|part| rest.take(part)).unwrap_or_default()
+                };
+                let contact = taken(&segments.warm_contact);
+                let friction = taken(&segments.warm_friction);
+                warm = Some((place, WarmSegments { contact, friction }));
             }
         }
-        Self { velocities, poses, entries }
+        Self { velocities, poses, entries, warm }
+    }
+}
+
+/// The rest of a buffer, from which segments are taken one after the other.
+struct Rest<'a> {
+    beats: &'a mut [Beat],
+    /// Where the rest begins in the buffer.
+    at: usize,
+}
+
+impl<'a> Rest<'a> {
+    /// Takes a segment; an empty one may lie beyond the buffer.
+    fn take(&mut self, segment: &Range<usize>) -> &'a mut [Beat] {
+        if segment.is_empty() {
+            return &mut [];
+        }
+        let beats = std::mem::take(&mut self.beats);
+        let (_, beats) = beats.split_at_mut(segment.start - self.at);
+        let (taken, beats) = beats.split_at_mut(segment.len());
+        (self.beats, self.at) = (beats, segment.end);
+        taken
     }
 }

@@ -4,6 +4,7 @@
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 use super::packing::SentSums;
 use crate::axi_dma::Direction;
@@ -31,8 +32,9 @@ pub(super) fn check_received(
     let Some((received, _)) = counters.sums else { return Ok(()) };
     #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
     let rounds = plan.rounds() as u32;
-    let expected =
-        sent.velocities.wrapping_add(sent.collisions.wrapping_mul(rounds)).wrapping_add(sent.poses);
+    let SentSums { velocities, collisions, warm, poses } = sent;
+    let parts = [velocities, collisions.wrapping_mul(rounds), warm.contact, warm.friction, poses];
+    let expected = parts.into_iter().fold(0, u32::wrapping_add);
     if received != expected {
         let direction = Direction::Mm2s;
         return Err(Fault::Checksum { direction, expected, found: received });
@@ -80,9 +82,15 @@ pub(super) fn received<'a>(
 ) -> [&'a [Beat]; DMA_COUNT_MAX] {
     let mut channels = <[&[Beat]; DMA_COUNT_MAX]>::default();
     for (place, port) in ports.iter().enumerate() {
-        channels[place] = &port.beats(bank)[..plan.results(place)];
+        channels[place] = &port.beats(bank)[plan.impulses(place)..plan.results(place)];
     }
     channels
+}
+
+/// The beats of impulses in a bank.
+pub(super) fn impulses_of<'a>(ports: &'a [Port], plan: &Plan, bank: Bank) -> &'a [Beat] {
+    let port = ports.get(IMPULSES_STREAM);
+    port.map_or(&[], |port| &port.beats(bank)[..plan.impulses(IMPULSES_STREAM)])
 }
 
 /// The result segments of a step.

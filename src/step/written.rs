@@ -105,6 +105,9 @@ impl Accelerator {
         if !in_order_of_writing(&device.capabilities, parameters) {
             return Err(InputError::WrittenInOrder.into());
         }
+        if parameters.warm_start {
+            return Err(InputError::WrittenWarm.into());
+        }
         let scene = preflight(bodies, &Announced(announced), shapes, parameters, limits)?;
         host.validate = watch.lap();
 
@@ -134,6 +137,7 @@ impl Accelerator {
             sent,
             parameters: *parameters,
             bodies: plan.bodies,
+            given: written.collisions,
             collisions: written.collisions - written.paddings,
             empty: if sent.is_some() { written.paddings } else { 0 },
             order_summary: OrderSummary::as_given(OrderChoice::Asked),

@@ -68,6 +68,12 @@ pub enum InputError {
     )]
     WrittenInOrder,
 
+    /// Collisions that are written one by one have no impulses.
+    #[error(
+        "collisions that are written one by one come without impulses: leave          `StepParameters::warm_start` out, or give all collisions at once (step, submit, prepare)"
+    )]
+    WrittenWarm,
+
     /// The prepared step was checked and packed with other shapes.
     #[error("the shapes were replaced after the step was prepared: prepare it again")]
     ShapesChanged,
@@ -139,6 +145,13 @@ pub enum InputError {
         collision: usize,
         /// Its friction.
         found: f32,
+    },
+
+    /// An impulse that a collision begins with is NaN or infinite.
+    #[error("collision {collision}: an impulse of its warm start is not finite: correct it")]
+    ImpulseNotFinite {
+        /// The collision.
+        collision: usize,
     },
 
     /// A body refers to a shape that was not set.

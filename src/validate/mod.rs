@@ -129,7 +129,11 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
     };
     for index in 0..scene.needs.collisions {
-        check_whole(index, &collisions.collision(index), end, &scene)?;
+        let collision = collisions.collision(index);
+        check_whole(index, &collision, end, &scene)?;
+        if parameters.warm_start && !collisions.impulses(index).used(&collision).are_finite() {
+            return Err(InputError::ImpulseNotFinite { collision: index });
+        }
     }
     Ok(())
 }

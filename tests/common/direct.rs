@@ -4,7 +4,7 @@
 //! Sources: `bitstream-model/README.md`, arithmetic; Bullet's `b3Matrix3x3::setRotation` for the
 //! rotation matrix.
 
-use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
+use zynq_pgs::{Body, Collision, Impulses, Shape, StepParameters, Velocity};
 
 pub(crate) type Vec3 = [f32; 3];
 
@@ -134,22 +134,22 @@ fn tangents(n: Vec3) -> [Vec3; 2] {
     }
 }
 
-/// Impulses of a collision.
-#[derive(Debug, Clone, Copy, Default)]
-struct Impulses {
-    normal: [f32; 4],
-    tangential: [f32; 2],
-}
+/// A pass over one collision. With the impulses that a step begins with, these take the place of the
+/// computed ones.
+type Pass =
+    fn(&Collision, &mut Moving, &mut Moving, &mut Impulses, Option<&Impulses>, &StepParameters);
 
 fn contact_pass(
     collision: &Collision,
     a: &mut Moving,
     b: &mut Moving,
     impulses: &mut Impulses,
+    given: Option<&Impulses>,
     parameters: &StepParameters,
 ) {
     let count = collision.points() as usize;
-    for (contact, sum) in collision.contacts[..count].iter().zip(&mut impulses.normal) {
+    let points = collision.contacts[..count].iter().zip(&mut impulses.normal);
+    for (i, (contact, sum)) in points.enumerate() {
         let row = Row::new(collision.normal, contact.point, a, b);
         if row.j == 0.0 {
             continue;
@@ -157,7 +157,7 @@ fn contact_pass(
         let depth = contact.distance + parameters.position_drift;
         let bias = (depth * parameters.position_coefficient) * (1.0 / parameters.time_step);
         let l = (row.speed(a, b) + bias) * row.j;
-        let u = max(*sum + l, 0.0);
+        let u = given.map_or_else(|| max(*sum + l, 0.0), |given| given.normal[i]);
         let l = u - *sum;
         *sum = u;
         row.apply(a, b, l);
@@ -169,6 +169,7 @@ fn friction_pass(
     a: &mut Moving,
     b: &mut Moving,
     impulses: &mut Impulses,
+    given: Option<&Impulses>,
     parameters: &StepParameters,
 ) {
     let points = &collision.contacts[..collision.points() as usize];
@@ -180,13 +181,17 @@ fn friction_pass(
     let own = collision.friction();
     let mu = if parameters.pair_friction { own } else { parameters.friction };
     let limit = mu * (((l0 + l1) + l2) + l3);
-    for (t, sum) in tangents(q).into_iter().zip(&mut impulses.tangential) {
+    for (k, (t, sum)) in tangents(q).into_iter().zip(&mut impulses.friction).enumerate() {
         let row = Row::new(t, centre, a, b);
         let l = row.speed(a, b) * row.j;
-        let u = min(max(*sum + l, -limit), limit);
+        let clamped = min(max(*sum + l, -limit), limit);
+        let u = given.map_or(clamped, |given| given.friction[k]);
         let l = u - *sum;
         *sum = u;
         row.apply(a, b, l);
+    }
+    if given.is_some() {
+        return;
     }
     let fixed = a.m == 0.0 || b.m == 0.0;
     if fixed || dot(unit(sub(b.p, a.p)), unit(sub(centre, a.p))) > 0.95 {
@@ -231,6 +236,17 @@ pub(crate) fn direct_step(
     shapes: &[Shape],
     parameters: &StepParameters,
 ) {
+    direct_step_from(None, bodies, collisions, shapes, parameters);
+}
+
+/// A step that begins with impulses, one record a collision; returns those that it ends with.
+pub(crate) fn direct_step_from(
+    given: Option<&[Impulses]>,
+    bodies: &mut [Body],
+    collisions: &[Collision],
+    shapes: &[Shape],
+    parameters: &StepParameters,
+) -> Vec<Impulses> {
     let mut moving: Vec<_> = bodies
         .iter()
         .map(|body| {
@@ -246,16 +262,20 @@ pub(crate) fn direct_step(
         .collect();
     let mut impulses = vec![Impulses::default(); collisions.len()];
     let passes = [
-        (parameters.contact_iterations, contact_pass as fn(&_, &mut _, &mut _, &mut _, &_)),
+        (parameters.contact_iterations, contact_pass as Pass),
         (parameters.friction_iterations, friction_pass),
     ];
     for (count, pass) in passes {
-        for _ in 0..count {
-            let given = collisions.iter().zip(&mut impulses);
-            for (collision, impulses) in given.filter(|(collision, _)| !collision.is_empty()) {
+        let warm = u32::from(given.is_some() && count > 0);
+        for number in 0..count + warm {
+            for (at, (collision, impulses)) in collisions.iter().zip(&mut impulses).enumerate() {
+                if collision.is_empty() {
+                    continue;
+                }
+                let given = given.filter(|_| number < warm).map(|given| &given[at]);
                 let [at_a, at_b] = [collision.body_a, collision.body_b].map(|at| at as usize);
                 let (mut a, mut b) = (moving[at_a], moving[at_b]);
-                pass(collision, &mut a, &mut b, impulses, parameters);
+                pass(collision, &mut a, &mut b, impulses, given, parameters);
                 for (at, body) in [(at_a, a), (at_b, b)] {
                     // Nothing changes the velocity of a body without a mass.
                     if body.m != 0.0 {
@@ -269,7 +289,7 @@ pub(crate) fn direct_step(
         for (body, moving) in bodies.iter_mut().zip(&moving) {
             body.velocity = Velocity { linear: moving.v, angular: moving.w };
         }
-        return;
+        return impulses;
     }
     let mut undamped = *parameters;
     undamped.angular_damping = 1.0;
@@ -282,4 +302,5 @@ pub(crate) fn direct_step(
             body.velocity = given;
         }
     }
+    impulses
 }

@@ -27,5 +27,6 @@ mod refusals;
 mod served;
 mod shapes;
 mod storage;
+mod warm_start;
 mod widths;
 mod windowed;

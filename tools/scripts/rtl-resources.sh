@@ -5,8 +5,9 @@
 # usage: rtl-resources.sh [OPTION...]     options of `rtlgen generate`, such as --collisions 100000
 # environment: YOSYS (the program; yosys)
 #
-# Without options there are two tables: the default build, and the one with the most collisions that
-# leaves room for four DMA engines. The pipelines are synthesised once, which takes minutes.
+# Without options there are three tables: the default build, the one with the most collisions that leaves
+# room for four DMA engines, and the cost of the rule for results that round up to the smallest normal number
+# (`--smallest-normal`). The pipelines are synthesised once, which takes minutes.
 #
 # Exit code: 0 done, 1 a build is too large, 77 skipped: not on this machine.
 set -euo pipefail
@@ -36,6 +37,7 @@ synthesise() {
 	attend timeout 3600 "$yosys" -q -p "
 		read_verilog $(tr '\n' ' ' < pgs.f)
 		${*:+blackbox $*}
+		${parameters:+chparam $parameters $top}
 		synth_xilinx -family xcup -noiopad -noclkbuf -top $top
 		tee -q -o $top.json stat -json" > "$top.log" 2>&1 || { tail -n 5 "$top.log" >&2; fail "Yosys on $top"; }
 	cd "$repository"
@@ -47,6 +49,18 @@ table() {
 		"$work/$1/pgs_top.json" "$work"/base/{contact,friction,integration}.json
 }
 
+# Prints what the rule of the smallest normal number takes in each operator that has it, and in all of them.
+rule() {
+	local operator
+	for operator in fmul fdiv; do
+		synthesise with "$operator"
+		parameters='-set SMALLEST_NORMAL 0' synthesise without "$operator"
+	done
+	attend python3 tools/scripts/rtl_resources.py --rule "$work/with" "$work/without" \
+		"$work"/base/{pgs_top,contact,friction,integration}.json
+}
+
+parameters=
 pipelines=(contact friction integration)
 generate base "$@"
 synthesise base pgs_top "${pipelines[@]}"
@@ -59,4 +73,8 @@ if [ $# = 0 ]; then
 	echo
 	echo "The same with $MOST_COLLISIONS collisions"
 	table most 880
+	generate with
+	generate without --smallest-normal dropped
+	echo
+	rule
 fi

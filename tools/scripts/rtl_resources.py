@@ -2,9 +2,11 @@
 """Prints what a build of the accelerator takes of the XCZU9EG, part by part.
 
 usage: rtl_resources.py [--brams LIMIT] STAT...
+       rtl_resources.py --rule WITH WITHOUT STAT...
 
 Each STAT is what Yosys' `stat -json` says of a synthesis that keeps the hierarchy. The first one has the
-module `pgs_top` without the modules of the others.
+module `pgs_top` without the modules of the others. With `--rule`, it prints what the rule of the smallest
+normal number takes: the folders WITH and WITHOUT have `fmul.json` and `fdiv.json`.
 
 Exit code: 0 done, 1 the build is over a limit.
 """
@@ -101,6 +103,39 @@ def add_up(modules, name, part, parts):
                 row[i] += one * count
 
 
+def instances(modules, name, wanted):
+    """How often a module is below another one, or is it."""
+    if plain(name) == wanted:
+        return 1
+    found = 0
+    for cell, count in modules[name]["num_cells_by_type"].items():
+        if isinstance(count, dict):
+            count = count["count"]
+        inner = cell if cell in modules else "\\" + cell
+        if inner in modules:
+            found += count * instances(modules, inner, wanted)
+    return found
+
+
+def print_rule(folders, modules):
+    """Prints the cost of the rule of the smallest normal number, in each unit and in all of them."""
+    print(line("smallest normal number, LUT (FF)", ("with", "without", "a unit", "units", "in all")))
+    total = [0, 0]
+    for operator in ("fmul", "fdiv"):
+        taken = []
+        for folder in folders:
+            parts = {}
+            add_up(modules_of(f"{folder}/{operator}.json"), "\\" + operator, operator, parts)
+            taken.append(parts[operator])
+        units = instances(modules, "\\pgs_top", operator)
+        more = [taken[0][i] - taken[1][i] for i in (LUT, FF)]
+        total = [sum_ + units * one for sum_, one in zip(total, more)]
+        print(line(operator, (
+            *(f"{row[LUT]:,} ({row[FF]:,})" for row in taken), f"{more[0]} ({more[1]})", units,
+            f"{units * more[0]:,} ({units * more[1]:,})")))
+    print(line("sum", ("", "", "", "", f"{total[0]:,} ({total[1]:,})")))
+
+
 def line(label, values):
     """A line of the table."""
     return f"{label:<38}" + "".join(f"{value:>12}" for value in values)
@@ -110,6 +145,7 @@ def main():
     """Reads the statistics and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--brams", type=float, default=DEVICE[BRAM], metavar="LIMIT")
+    parser.add_argument("--rule", nargs=2, metavar=("WITH", "WITHOUT"))
     parser.add_argument("stats", nargs="+", metavar="STAT")
     args = parser.parse_args()
     modules = {}
@@ -118,6 +154,9 @@ def main():
             # The modules that Yosys knows as black boxes have no cells.
             if name not in modules or module["num_cells"]:
                 modules[name] = module
+    if args.rule:
+        print_rule(args.rule, modules)
+        return
     parts = {}
     add_up(modules, "\\pgs_top", REST, parts)
     sums = [sum(row[i] for row in parts.values()) for i in range(5)]

@@ -70,7 +70,9 @@ def stub(module, found):
     inputs = [(width, name) for way, width, name in found if way == "input" and name not in CLOCKS]
     outputs = [(width, name) for way, width, name in found if way == "output"]
     bits_in, bits_out = sum(width for width, _ in inputs), sum(width for width, _ in outputs)
-    print(f"module {module} (")
+    # Instances of the operators give it.
+    parameter = "#(parameter SMALLEST_NORMAL = 1) " if module in ("fmul", "fdiv") else ""
+    print(f"module {module} {parameter}(")
     print(",\n".join(f"  {way} wire [{width - 1}:0] {name}" for way, width, name in found))
     print(");")
     rows = -(-bits_in // bits_out)

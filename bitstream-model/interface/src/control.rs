@@ -55,6 +55,12 @@ pub mod flags {
     /// The friction of a collision is above its contact count, and FRICTION is not used. Only in a
     /// bitstream with [`features::PAIR_FRICTION`](super::features::PAIR_FRICTION).
     pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 2, Access::ReadWrite);
+    /// Impulses come in with the collisions, in a pass of their own in front of the passes of each
+    /// kind. Only in a bitstream with [`features::WARM_START`](super::features::WARM_START).
+    pub const WARM_START: Field = Field::bit("warm_start", 3, Access::ReadWrite);
+    /// The impulses go out in front of the results. Only in a bitstream with
+    /// [`features::WARM_START`](super::features::WARM_START).
+    pub const IMPULSES_OUT: Field = Field::bit("impulses_out", 4, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -88,6 +94,9 @@ pub mod features {
     /// Each collision can have a friction of its own
     /// ([`flags::PAIR_FRICTION`](super::flags::PAIR_FRICTION)).
     pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 7, Access::ReadOnly);
+    /// Impulses can come in and go out ([`flags::WARM_START`](super::flags::WARM_START),
+    /// [`flags::IMPULSES_OUT`](super::flags::IMPULSES_OUT)).
+    pub const WARM_START: Field = Field::bit("warm_start", 8, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -255,7 +264,13 @@ pub const FLAGS: Register = row(
     0x30,
     Access::ReadWrite,
     0,
-    &[flags::INTEGRATE, flags::KINEMATIC, flags::PAIR_FRICTION],
+    &[
+        flags::INTEGRATE,
+        flags::KINEMATIC,
+        flags::PAIR_FRICTION,
+        flags::WARM_START,
+        flags::IMPULSES_OUT,
+    ],
     OURS,
 );
 /// Time step, s, f32.
@@ -319,6 +334,7 @@ pub const FEATURES: Register = read_only(
         features::SPIN_DAMPING,
         features::KINEMATIC,
         features::PAIR_FRICTION,
+        features::WARM_START,
     ],
 );
 /// Numbers of streams.

@@ -16,13 +16,17 @@ pub struct Extensions {
     pub kinematic: bool,
     /// Each collision can have a friction of its own.
     pub pair_friction: bool,
+    /// Impulses of collisions can come in and go out.
+    pub warm_start: bool,
 }
 
 impl Extensions {
     /// None: a bitstream of version 1.1.
-    pub const NONE: Self = Self { spin_damping: false, kinematic: false, pair_friction: false };
+    pub const NONE: Self =
+        Self { spin_damping: false, kinematic: false, pair_friction: false, warm_start: false };
     /// All of this version.
-    pub const ALL: Self = Self { spin_damping: true, kinematic: true, pair_friction: true };
+    pub const ALL: Self =
+        Self { spin_damping: true, kinematic: true, pair_friction: true, warm_start: true };
 
     /// The extensions that the FEATURES register reports.
     #[must_use]
@@ -31,6 +35,7 @@ impl Extensions {
             spin_damping: features::SPIN_DAMPING.is_set(features),
             kinematic: features::KINEMATIC.is_set(features),
             pair_friction: features::PAIR_FRICTION.is_set(features),
+            warm_start: features::WARM_START.is_set(features),
         }
     }
 
@@ -41,11 +46,13 @@ impl Extensions {
         bit(features::SPIN_DAMPING, self.spin_damping)
             | bit(features::KINEMATIC, self.kinematic)
             | bit(features::PAIR_FRICTION, self.pair_friction)
+            | bit(features::WARM_START, self.warm_start)
     }
 
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
+    /// Impulses need passes one after the other, and a stripe for their records.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, .. } = variant;
@@ -56,6 +63,8 @@ impl Extensions {
                 && absolute
                 && !matches!(numbers.bodies, StreamFormat::Thesis16),
             pair_friction: absolute && matches!(numbers.collisions, StreamFormat::F32),
+            warm_start: profile.stripes.warm_collisions.is_some()
+                && matches!(numbers.collisions, StreamFormat::F32),
         }
     }
 
@@ -66,6 +75,7 @@ impl Extensions {
             spin_damping: self.spin_damping && other.spin_damping,
             kinematic: self.kinematic && other.kinematic,
             pair_friction: self.pair_friction && other.pair_friction,
+            warm_start: self.warm_start && other.warm_start,
         }
     }
 }

@@ -16,6 +16,8 @@
 //!             2  pB.x     pB.y     pB.z     bodyB
 //!             3  c0.x     c0.y     c0.z     distance0
 //!             .. 6        up to four contact points
+//!             7  L0       L1       L2       L3         in a warm contact pass only
+//!             7  G0       G1       0        0          in a warm friction pass only
 //! collision   0  n.x      n.y      n.z      bodyA
 //! (relative)  1  r.x      r.y      r.z      bodyB      r = pB - pA
 //!             2  a0.x     a0.y     a0.z     distance0  a = c - pA
@@ -26,6 +28,8 @@
 //!             1  q.x      q.y      q.z      q.w
 //!             2  v.x      v.y      v.z      0
 //!             3  w.x      w.y      w.z      0
+//! impulses    0  L0       L1       L2       L3         after the last contact pass
+//!             0  G0       G1       0        0          after the last friction pass
 //! ```
 //!
 //! Metres, m/s, rad/s, 1/(kg m²), world frame. `n` is the unit normal from B to A; a contact point
@@ -73,6 +77,10 @@ pub mod velocity {
 pub mod collision {
     /// Rows of a record.
     pub const ROWS: usize = 7;
+    /// Rows of a record of a warm pass.
+    pub const WARM_ROWS: usize = 8;
+    /// In a warm pass, the impulses to begin with: four normal ones, or two of friction and zeros.
+    pub const IMPULSES: usize = 7;
     /// Normal from B to A; the word beside it is the number of contact points, in steps with a
     /// friction for each pair with the friction above it.
     pub const NORMAL: usize = 0;

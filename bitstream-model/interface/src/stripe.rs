@@ -25,15 +25,29 @@ impl Stripes {
     /// One stripe for collisions and one for all records of bodies.
     #[must_use]
     pub const fn new(collisions: Stripe, bodies: Stripe) -> Self {
-        Self { collisions, velocities: bodies, poses: bodies, results: bodies }
+        let warm_collisions = None;
+        Self { collisions, warm_collisions, velocities: bodies, poses: bodies, results: bodies }
+    }
+
+    /// The stripes with one for collision records of warm passes.
+    #[must_use]
+    pub const fn with_warm_collisions(self, warm: Stripe) -> Self {
+        Self { warm_collisions: Some(warm), ..self }
     }
 }
+
+/// The S2MM stream on which impulses go out: a beat for each collision in the packet of the results, in
+/// front of them.
+pub const IMPULSES_STREAM: usize = 0;
 
 /// The stripes of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Stripes {
     /// Collision records.
     pub collisions: Stripe,
+    /// Collision records of a warm pass, in a design that can have one: the stripe of the other
+    /// passes, and the stream of the impulses behind it.
+    pub warm_collisions: Option<Stripe>,
     /// Velocity records.
     pub velocities: Stripe,
     /// Pose records.

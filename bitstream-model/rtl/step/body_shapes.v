@@ -1,7 +1,7 @@
 // The shape of every body, and the mass properties of every shape.
 //
-// A body's number at `address` gives its properties 3 cycles later. While `loading`, the properties
-// of the shape at `lookup` come one cycle later instead.
+// A body's number at `address` gives its properties 3 cycles later. From the cycle after `loading`
+// begins to the one after it ends, the properties of the shape at `lookup` come one cycle later instead.
 //
 // The table holds beside each inverse mass whether it is other than 0, so that no reader has to look
 // at its 31 bits.
@@ -47,8 +47,11 @@ module body_shapes #(
 
   wire unused = &{1'b0, found_a[7:SHAPE], found_b[7:SHAPE]};
 
-  wire [SHAPE-1:0] index_a = loading ? lookup_a : found_a[SHAPE-1:0];
-  wire [SHAPE-1:0] index_b = loading ? lookup_b : found_b[SHAPE-1:0];
+  // In a register: it selects the address of four tables.
+  reg looks_up;
+  always @(posedge clk) looks_up <= loading;
+  wire [SHAPE-1:0] index_a = looks_up ? lookup_a : found_a[SHAPE-1:0];
+  wire [SHAPE-1:0] index_b = looks_up ? lookup_b : found_b[SHAPE-1:0];
   always @(posedge clk) begin
     properties_a[63:32]             <= inverse_inertia[index_a];
     {moves_a, properties_a[31:0]}   <= inverse_mass[index_a];

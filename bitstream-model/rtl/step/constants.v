@@ -5,7 +5,9 @@
 // a test of the generator holds the first cycle in which a pipeline can read one against READY.
 `default_nettype none
 
-module constants (
+module constants #(
+  parameter SMALLEST_NORMAL = 1
+) (
   input  wire        clk,
   input  wire        start,
   input  wire [31:0] time_step,
@@ -58,8 +60,8 @@ module constants (
       end
     endcase
   end
-  fmul multiplier (.clk(clk), .a(a), .b(b), .y(product));
-  fdiv divider (.clk(clk), .a(numerator), .b(time_step), .y(quotient));
+  fmul #(.SMALLEST_NORMAL(SMALLEST_NORMAL)) multiplier (.clk(clk), .a(a), .b(b), .y(product));
+  fdiv #(.SMALLEST_NORMAL(SMALLEST_NORMAL)) divider (.clk(clk), .a(numerator), .b(time_step), .y(quotient));
 
   always @(posedge clk) if (running) begin
     if (cycle == 6'd2 + MULTIPLY) half_step           <= product;

@@ -38,7 +38,7 @@ module loader #(
   output reg  [19:0]     error_body
 );
   reg  [19:0] body;         // the next one
-  reg         write_s1;
+  reg         write_s1, beyond_s1;
   reg  [BODY-1:0] body_s1;
   reg  [7:0]  shape_s1;
   reg [191:0] velocity_s1, velocity_s2;
@@ -71,8 +71,9 @@ module loader #(
     lookup      <= linear[96 +: SHAPE];
     shape_s1    <= linear[103:96];
     velocity_s1 <= {angular[95:0], linear[95:0]};
-    error       <= pop & |linear[127:96+SHAPE];
-    error_body  <= body;
+    beyond_s1   <= |linear[127:96+SHAPE];
+    error       <= write_s1 & beyond_s1;
+    error_body  <= {{(20-BODY){1'b0}}, body_s1};
 
     write       <= write_s1;
     address     <= body_s1;

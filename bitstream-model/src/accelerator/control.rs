@@ -70,8 +70,42 @@ pub(crate) struct Arguments {
     pub(crate) integrate: bool,
     /// Whether bodies of inverse mass 0 have the velocity of their record.
     pub(crate) kinematic: bool,
+    /// Whether impulses come in with the collisions, in a pass in front of the others of each kind.
+    pub(crate) warm_start: bool,
+    /// Whether the impulses go out in front of the results.
+    pub(crate) impulses_out: bool,
     pub(crate) solver: SolverParameters,
     pub(crate) integration: Integration,
+}
+
+impl Arguments {
+    /// Passes of one kind that iterates that often.
+    fn passes_of(&self, iterations: u32) -> u32 {
+        iterations.saturating_add(u32::from(self.warm_start && iterations > 0))
+    }
+
+    /// Contact passes, with the warm one.
+    pub(crate) fn contact_passes(&self) -> u32 {
+        self.passes_of(self.contact_iterations)
+    }
+
+    /// All passes of the step; without collisions there is none.
+    pub(crate) fn passes(&self) -> u32 {
+        match self.collisions {
+            0 => 0,
+            _ => self.contact_passes().saturating_add(self.passes_of(self.friction_iterations)),
+        }
+    }
+
+    /// Whether impulses come in with the collisions of a pass.
+    pub(crate) fn is_warm(&self, pass: u32) -> bool {
+        self.warm_start && (pass == 0 || pass == self.contact_passes())
+    }
+
+    /// Whether the impulses after a pass go out.
+    pub(crate) fn sends_impulses(&self, pass: u32) -> bool {
+        self.impulses_out && (pass + 1 == self.contact_passes() || pass + 1 == self.passes())
+    }
 }
 
 /// Writable words between AP_CTRL and the capabilities.
@@ -174,7 +208,7 @@ impl Registers {
     pub(super) fn arguments(&self) -> Arguments {
         let time_step = self.number(TIME_STEP.offset);
         let set = self.argument(FLAGS.offset);
-        let Extensions { kinematic, pair_friction, .. } = self.extensions;
+        let Extensions { kinematic, pair_friction, warm_start, .. } = self.extensions;
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
@@ -182,6 +216,8 @@ impl Registers {
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
             integrate: flags::INTEGRATE.is_set(set),
             kinematic: kinematic && flags::KINEMATIC.is_set(set),
+            warm_start: warm_start && flags::WARM_START.is_set(set),
+            impulses_out: warm_start && flags::IMPULSES_OUT.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),

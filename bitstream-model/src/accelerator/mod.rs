@@ -270,7 +270,8 @@ impl Accelerator {
                 Phase::Idle | Phase::Failed => break,
                 Phase::Load(segment) => self.load(segment, inputs, memory, deferral.as_deref_mut()),
                 Phase::Pass { number, segment } => {
-                    self.pass(number, segment, left, inputs, memory, deferral.as_deref_mut())
+                    let deferral = deferral.as_deref_mut();
+                    self.pass(number, segment, left, inputs, outputs, memory, deferral)
                 }
                 Phase::Integrate { poses, results } => {
                     let deferral = deferral.as_deref_mut();
@@ -308,14 +309,14 @@ impl Accelerator {
 
     /// The packets of the step.
     fn step_shape(&self) -> StepShape {
-        let segments = [self.velocities_in(), self.collisions_in(), self.poses_in()];
+        let segments = [self.velocities_in(), self.collisions_in(0), self.poses_in()];
         let once = matches!(self.variant.profile.flow, Flow::Window(_));
         StepShape {
             segments: std::array::from_fn(|core| {
                 segments.each_ref().map(|segment| segment.beats_on(core) > 0)
             }),
-            contact: self.arguments.contact_iterations,
-            passes: self.passes(),
+            contact: self.arguments.contact_passes(),
+            passes: self.arguments.passes(),
             streamed: if once { Streamed::Once } else { Streamed::PerPass },
         }
     }
@@ -336,7 +337,7 @@ impl Accelerator {
             Phase::Window => (None, None),
             Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
             Phase::Pass { number, segment } => {
-                let contact = self.arguments.contact_iterations;
+                let contact = self.arguments.contact_passes();
                 let phase = match number.checked_sub(contact) {
                     None => StepPhase::Contact(number + 1),
                     Some(number) => StepPhase::Friction(number + 1),

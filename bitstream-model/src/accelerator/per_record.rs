@@ -118,10 +118,11 @@ impl Accelerator {
         impulses: &mut Impulses,
     ) {
         let parameters = &self.arguments.solver;
-        let contacts = self.arguments.contact_iterations;
+        let contacts = self.arguments.contact_passes();
+        let given = self.arguments.is_warm(pass).then_some(&collision.impulses);
         let precision = self.variant.numbers.impulses;
         if pass < contacts {
-            solver::contact::<R, U, I>(collision, parameters, masses, velocities, impulses);
+            solver::contact::<R, U, I>(collision, parameters, masses, velocities, impulses, given);
             *impulses = self.stored(precision, *impulses);
             if pass + 1 == contacts {
                 self.counters.impulse_sum =
@@ -132,7 +133,7 @@ impl Accelerator {
                 let sum = solver::normal_sum::<U>(impulses);
                 *impulses = self.stored(precision, [sum, 0.0, 0.0, 0.0]);
             }
-            solver::friction::<R, U, I>(collision, parameters, masses, velocities, impulses);
+            solver::friction::<R, U, I>(collision, parameters, masses, velocities, impulses, given);
             *impulses = self.stored(precision, *impulses);
         }
         *velocities = velocities.map(|velocity| self.stored_velocity(velocity));

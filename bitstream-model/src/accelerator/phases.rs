@@ -2,7 +2,6 @@
 
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
-use super::control::Arguments;
 use super::defer::{ArrivedRecords, Deferral};
 use super::hazards::Entry;
 use super::records::array::{Array, Records};
@@ -19,7 +18,8 @@ use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
-use pgs_interface::record::{CONTACT_POINTS, pose, result};
+use pgs_interface::record::{CONTACT_POINTS, collision, pose, result};
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Collisions of a pass that have arrived, and for how many cycles they may enter.
 #[derive(Debug)]
@@ -29,6 +29,8 @@ struct PassInput<'a> {
     records: usize,
     limit: u64,
     inputs: &'a mut [Stream],
+    /// For the impulses that go out.
+    outputs: &'a mut [Stream],
 }
 
 impl Accelerator {
@@ -49,12 +51,17 @@ impl Accelerator {
         Segment::new(Array::new(striping, self.body_records(numbers.poses, pose::ROWS)))
     }
 
-    pub(super) fn collisions_in(&self) -> Segment {
+    /// The collisions of a pass. In a warm pass their impulses follow them.
+    pub(super) fn collisions_in(&self, pass: u32) -> Segment {
         let profile = self.variant.profile;
-        let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
+        let (stripe, rows) = match profile.stripes.warm_collisions {
+            Some(warm) if self.arguments.is_warm(pass) => (warm, collision::WARM_ROWS),
+            _ => (profile.stripes.collisions, self.variant.collision_rows()),
+        };
+        let striping = Striping::new(&stripe, profile.mm2s_widths);
         let records = Records {
             format: self.variant.numbers.collisions,
-            rows: self.variant.collision_rows(),
+            rows,
             count: self.arguments.collisions as usize,
             together: profile.collisions_per_issue as usize,
         };
@@ -127,21 +134,15 @@ impl Accelerator {
         Ok(())
     }
 
-    /// Passes of the step; without collisions there is none. Arguments that were refused may be any.
-    pub(super) fn passes(&self) -> u32 {
-        let Arguments { collisions, contact_iterations, friction_iterations, .. } = self.arguments;
-        if collisions == 0 { 0 } else { contact_iterations.saturating_add(friction_iterations) }
-    }
-
     /// Depth of the pipeline that a pass goes through.
     pub(crate) fn depth(&self, pass: u32) -> Depth {
         let profile = self.variant.profile;
-        let contact = pass < self.arguments.contact_iterations;
+        let contact = pass < self.arguments.contact_passes();
         self.config.depth(if contact { profile.contact } else { profile.friction })
     }
 
     fn start_pass(&mut self, number: u32, deferral: Deferral<'_>) {
-        if number == self.passes() {
+        if number == self.arguments.passes() {
             if let Some(defer) = deferral {
                 defer.compute(self, number, 0);
             }
@@ -153,7 +154,7 @@ impl Accelerator {
         if let Some(defer) = deferral {
             defer.begin_pass(self.pipeline.depth());
         }
-        self.phase = Phase::Pass { number, segment: self.collisions_in() };
+        self.phase = Phase::Pass { number, segment: self.collisions_in(number) };
     }
 
     /// Takes the collisions that have arrived, for up to `limit` cycles.
@@ -163,16 +164,24 @@ impl Accelerator {
         mut segment: Segment,
         limit: u64,
         inputs: &mut [Stream],
+        outputs: &mut [Stream],
         memory: &Memory,
         mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let mut records = segment.available(inputs);
+        let arrived = records;
+        if self.arguments.sends_impulses(number) {
+            records = records.min(outputs[IMPULSES_STREAM].space());
+        }
         if records < segment.left() {
             // The collisions of an issue enter together.
             records -= records % self.variant.profile.collisions_per_issue as usize;
         }
+        if arrived == 0 {
+            segment.check_waiting(inputs)?;
+        }
         if records == 0 {
-            return segment.check_waiting(inputs).map(|()| false);
+            return Ok(false);
         }
         segment.check(records, inputs)?;
         let deferred = match deferral.as_deref_mut().filter(|defer| defer.takes_collisions()) {
@@ -184,7 +193,10 @@ impl Accelerator {
         };
         let cycles = match deferred {
             Some(cycles) => cycles,
-            None => self.solve_arrived(number, &mut segment, records, limit, inputs)?,
+            None => {
+                let input = PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
+                self.solve_arrived(input)?
+            }
         };
         self.debt += cycles;
         self.phase = Phase::Pass { number, segment };
@@ -200,15 +212,7 @@ impl Accelerator {
 
     /// Solves collisions that have arrived, for up to `limit` cycles; returns the cycles that they
     /// take to enter, stalls included.
-    fn solve_arrived(
-        &mut self,
-        number: u32,
-        segment: &mut Segment,
-        records: usize,
-        limit: u64,
-        inputs: &mut [Stream],
-    ) -> Result<u64, PacketError> {
-        let input = PassInput { number, segment, records, limit, inputs };
+    fn solve_arrived(&mut self, input: PassInput<'_>) -> Result<u64, PacketError> {
         match self.config.subnormals {
             Subnormals::Keep => self.solve_of::<Single, Half>(input),
             Subnormals::Flush => self.solve_of::<SingleFlushed, HalfFlushed>(input),
@@ -239,10 +243,14 @@ impl Accelerator {
         &mut self,
         input: PassInput<'_>,
     ) -> Result<u64, PacketError> {
-        let PassInput { number, segment, records: available, limit, inputs } = input;
+        let PassInput { number, segment, records: available, limit, inputs, outputs } = input;
         let profile = self.variant.profile;
-        let interval = u64::from(profile.initiation_interval);
         let per_issue = profile.collisions_per_issue as usize;
+        let warm = self.arguments.is_warm(number);
+        let sends = self.arguments.sends_impulses(number);
+        // A longer record may take its streams longer.
+        let of_streams = if warm { segment.cycles_of_one() } else { 0 };
+        let interval = u64::from(profile.initiation_interval).max(of_streams);
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
@@ -250,11 +258,17 @@ impl Accelerator {
             let issue = (available - records).min(per_issue);
             let first = segment.done + records;
             for index in first..first + issue {
-                let collision = self.collision(&mut reader);
+                let collision = match warm {
+                    true => Collision::warm(&reader.record(), self.arguments.solver.pair_friction),
+                    false => self.collision(&mut reader),
+                };
                 let now = self.clock + cycles;
                 let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
                 cycles += stall;
                 self.counters.stalls += stall;
+                if sends {
+                    self.send_impulses(number, index, &collision, outputs);
+                }
             }
             cycles += interval;
             records += issue;
@@ -262,6 +276,24 @@ impl Accelerator {
         let sum = segment.advance(records, inputs);
         self.received(sum);
         Ok(cycles)
+    }
+
+    /// Sends the impulses of a collision after the last pass of its kind; zeros for padding.
+    fn send_impulses(
+        &mut self,
+        pass: u32,
+        index: usize,
+        collision: &Collision,
+        outputs: &mut [Stream],
+    ) {
+        let impulses = match self.impulses[index] {
+            _ if collision.count == 0 => [0.0; CONTACT_POINTS],
+            normal if pass < self.arguments.contact_passes() => normal,
+            [_, first, second, _] => [first, second, 0.0, 0.0],
+        };
+        let beat = decode::impulses(impulses);
+        self.sent(beat.0.into_iter().fold(0, u32::wrapping_add));
+        outputs[IMPULSES_STREAM].push(&[beat]);
     }
 
     /// The next collision.

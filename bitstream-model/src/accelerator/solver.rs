@@ -186,7 +186,8 @@ fn tangents<R: Format>(n: Vec3<R>) -> [Vec3<R>; 2] {
     }
 }
 
-/// One contact pass over one collision.
+/// One contact pass over one collision. In a warm pass `given` takes the place of the impulses that
+/// the others compute.
 #[inline]
 pub(crate) fn contact<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
@@ -194,6 +195,7 @@ pub(crate) fn contact<R: Format, U: Format, I: Inertia>(
     masses: &[Mass; 2],
     velocities: &mut [Velocity; 2],
     impulses: &mut Impulses,
+    given: Option<&Impulses>,
 ) {
     let inverses = [Inverse::<R, I>::new(&masses[0]), Inverse::new(&masses[1])];
     let mut a = Moving::<U, I>::new(&velocities[0], &masses[0]);
@@ -205,7 +207,7 @@ pub(crate) fn contact<R: Format, U: Format, I: Inertia>(
     let drift = Number::<R>::new(parameters.drift);
     let coefficient = Number::<R>::new(parameters.coefficient);
     let contacts = &collision.contacts[..collision.count];
-    for ([x, y, z, distance], impulse) in contacts.iter().copied().zip(impulses) {
+    for (i, ([x, y, z, distance], impulse)) in contacts.iter().copied().zip(impulses).enumerate() {
         let point = Vec3::<R>::new([x, y, z]);
         let row = Row::new(n, point - position_a, point - position_b, &inverses);
         if row.jacobian.is_zero() {
@@ -215,7 +217,10 @@ pub(crate) fn contact<R: Format, U: Format, I: Inertia>(
         let row = row.widened::<U>();
         let wanted = (row.speed(&a, &b) + bias.widened()) * row.jacobian;
         let before = Number::new(*impulse);
-        let after = (before + wanted).larger(Number::new(0.0));
+        let after = match given {
+            Some(given) => Number::new(given[i]),
+            None => (before + wanted).larger(Number::new(0.0)),
+        };
         *impulse = after.value();
         row.apply(after - before, &mut a, &mut b);
     }
@@ -230,7 +235,8 @@ pub(crate) fn normal_sum<U: Format>(impulses: &Impulses) -> f32 {
 }
 
 /// One friction pass over one collision; `impulses` holds the normal sum and the two friction
-/// impulses.
+/// impulses. In a warm pass the first two of `given` take the place of the impulses that the others
+/// compute, and the spin stays.
 #[inline]
 pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     collision: &Collision,
@@ -238,6 +244,7 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     masses: &[Mass; 2],
     velocities: &mut [Velocity; 2],
     impulses: &mut Impulses,
+    given: Option<&Impulses>,
 ) {
     let inverses = [Inverse::<R, I>::new(&masses[0]), Inverse::new(&masses[1])];
     let mut a = Moving::<U, I>::new(&velocities[0], &masses[0]);
@@ -259,7 +266,7 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     let arm_b = centre - position_b;
     let mu = if parameters.pair_friction { collision.friction } else { parameters.friction };
     let limit = Number::<U>::new(mu) * Number::new(impulses[0]);
-    for (t, accumulated) in tangents(q).into_iter().zip(&mut impulses[1..3]) {
+    for (k, (t, accumulated)) in tangents(q).into_iter().zip(&mut impulses[1..3]).enumerate() {
         let row = Row::new(t, arm_a, arm_b, &inverses);
         if row.jacobian.is_zero() {
             continue;
@@ -267,13 +274,17 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
         let row = row.widened::<U>();
         let wanted = row.speed(&a, &b) * row.jacobian;
         let before = Number::new(*accumulated);
-        let after = (before + wanted).larger(-limit).smaller(limit);
+        let after = match given {
+            Some(given) => Number::new(given[k]),
+            None => (before + wanted).larger(-limit).smaller(limit),
+        };
         *accumulated = after.value();
         row.apply(after - before, &mut a, &mut b);
     }
     let cosine = || (position_b - position_a).unit().dot(arm_a.unit());
     let one_static = a.inverse.m.is_zero() || b.inverse.m.is_zero();
-    if one_static || cosine().above(Number::new(SPIN_COSINE)) {
+    let damps = one_static || cosine().above(Number::new(SPIN_COSINE));
+    if given.is_none() && damps {
         let share = Number::new(parameters.spin_damping);
         let q = q.widened::<U>();
         let spin_a = q.dot(a.w);
@@ -313,6 +324,7 @@ mod tests {
             position_a: [0.0, -1.0, 0.0],
             position_b: [0.0, 1.0, 0.0],
             contacts: [[0.0; 4]; CONTACT_POINTS],
+            impulses: [0.0; CONTACT_POINTS],
         }
     }
 
@@ -331,6 +343,7 @@ mod tests {
             &masses,
             &mut velocities,
             &mut impulses,
+            None,
         );
         assert_eq!(velocities[1].linear, [0.0, 0.0, 0.0]);
         assert_eq!(impulses, [3.0, 0.0, 0.0, 0.0]);
@@ -348,6 +361,7 @@ mod tests {
             &masses,
             &mut velocities,
             &mut impulses,
+            None,
         );
         assert_eq!(velocities[1].linear, [0.0, 3.0, 0.0]);
         assert_eq!(impulses, [0.0; 4]);
@@ -364,6 +378,7 @@ mod tests {
             &masses,
             &mut velocities,
             &mut impulses,
+            None,
         );
         assert_eq!(velocities[1].linear, [3.5, 0.0, 0.0]);
         let before = velocities;
@@ -373,6 +388,7 @@ mod tests {
             &masses,
             &mut velocities,
             &mut impulses,
+            None,
         );
         assert_eq!(velocities, before, "the limit is used up");
     }

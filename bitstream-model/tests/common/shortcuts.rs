@@ -33,6 +33,7 @@ static ON_ONE: Profile =
 static BODIES_APART: Profile = Profile {
     stripes: Stripes {
         collisions: Stripe { streams: &[2, 0, 1], padded: true },
+        warm_collisions: None,
         velocities: Stripe { streams: &[2], padded: false },
         poses: Stripe { streams: &[1], padded: false },
         results: Stripe { streams: &[0, 1, 2], padded: true },

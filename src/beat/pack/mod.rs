@@ -4,6 +4,7 @@ pub(crate) mod bodies;
 pub(crate) mod body_records;
 pub(crate) mod collisions;
 pub(crate) mod encode;
+pub(crate) mod impulses;
 pub(crate) mod pattern;
 pub(crate) mod pool;
 pub(crate) mod stripe_writer;

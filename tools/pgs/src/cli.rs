@@ -90,10 +90,13 @@ fn reads(verb: &Verb) -> Reads {
         board: !matches!(verb, Verb::Model(_) | Verb::Load(_)),
         emulated_memory: matches!(verb, Verb::Serve(_)),
         manager: !matches!(verb, Verb::Model(_)),
-        accelerator: matches!(
-            verb,
-            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_)
-        ),
+        accelerator: match verb {
+            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => true,
+            Verb::Compare(_) => true,
+            // The step of a folder is measured without taking it.
+            Verb::Formats(args) => args.takes_steps(),
+            _ => false,
+        },
     }
 }
 

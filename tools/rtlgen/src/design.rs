@@ -22,6 +22,10 @@ pub struct Parameters {
     pub address_stages: u32,
     /// Registers behind the velocities and the impulses.
     pub output_stages: u32,
+    /// Whether products and quotients round up to the smallest normal number, as the specification
+    /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
+    /// specification.
+    pub smallest_normal: bool,
     /// Clock that `CLOCK_KHZ` reports, kHz.
     pub clock_khz: u32,
 }
@@ -34,13 +38,14 @@ impl Default for Parameters {
             interlocked: true,
             address_stages: 2,
             output_stages: 3,
+            smallest_normal: true,
             clock_khz: FLOAT.clock_khz,
         }
     }
 }
 
 /// The extensions of the interface that the Verilog has.
-pub const EXTENSIONS: Extensions = Extensions::ALL;
+pub const EXTENSIONS: Extensions = Extensions { warm_start: false, ..Extensions::ALL };
 
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -16,6 +16,8 @@ pub struct Operator {
     pub latency: i32,
     /// Whether the operator is an arithmetic unit of its own in the tables, not a comparison.
     pub arithmetic: bool,
+    /// Whether the module has the parameter `SMALLEST_NORMAL`.
+    pub smallest_normal: bool,
 }
 
 /// All operations, in the order of the tables.
@@ -51,6 +53,7 @@ impl Operation {
             Self::NonZero => ("fnonzero", &["flag", "a"], 1, false),
             Self::Or => ("flogic_or", AB, 1, false),
         };
-        Operator { module, ports, latency, arithmetic }
+        let smallest_normal = matches!(self, Self::Multiply | Self::Divide);
+        Operator { module, ports, latency, arithmetic, smallest_normal }
     }
 }

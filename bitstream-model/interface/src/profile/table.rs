@@ -44,7 +44,8 @@ pub const NAIVE: Profile = Profile {
     stripes: Stripes::new(
         Stripe { streams: &[0], padded: false },
         Stripe { streams: &[0], padded: false },
-    ),
+    )
+    .with_warm_collisions(Stripe { streams: &[0], padded: false }),
     initiation_interval: 28,
     collisions_per_issue: 1,
     flow: Flow::Passes,
@@ -69,7 +70,8 @@ pub const FLOAT: Profile = Profile {
     stripes: Stripes::new(
         Stripe { streams: &[0, 1, 2, 3, 0, 1, 2], padded: false },
         Stripe { streams: &[0, 1, 2, 3], padded: false },
-    ),
+    )
+    .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
     initiation_interval: 2,
     collisions_per_issue: 1,
     flow: Flow::Passes,
@@ -139,6 +141,7 @@ pub const MIXED: Profile = Profile {
 /// are needed at different times do not wait for each other.
 const WINDOWED_STRIPES: Stripes = Stripes {
     collisions: Stripe { streams: &[0, 1], padded: false },
+    warm_collisions: None,
     velocities: Stripe { streams: &[2], padded: false },
     poses: Stripe { streams: &[3], padded: false },
     results: Stripe { streams: &[0, 1, 2, 3], padded: false },

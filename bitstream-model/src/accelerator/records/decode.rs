@@ -9,7 +9,7 @@ use crate::accelerator::integrate::Pose;
 use crate::accelerator::solver::Velocity;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{
-    CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
+    Beat, CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
 };
 
 /// The number in a word of a format.
@@ -55,6 +55,8 @@ pub(crate) struct Collision {
     pub(crate) position_b: [f32; 3],
     /// x, y, z and distance.
     pub(crate) contacts: [[f32; 4]; CONTACT_POINTS],
+    /// The impulses to begin with: four normal ones, or two of friction. In a warm pass only.
+    pub(crate) impulses: [f32; CONTACT_POINTS],
 }
 
 impl Collision {
@@ -71,6 +73,7 @@ impl Collision {
             position_a: vec3(format, rows[collision::BODY_A]),
             position_b: vec3(format, rows[collision::BODY_B]),
             contacts: [contact(0), contact(1), contact(2), contact(3)],
+            impulses: [0.0; CONTACT_POINTS],
         }
     }
 
@@ -83,6 +86,18 @@ impl Collision {
             friction: pair_friction(word),
             ..Self::absolute(StreamFormat::F32, rows)
         }
+    }
+
+    /// A record of a warm pass, in world coordinates and f32: one of the other passes, and the impulses.
+    #[inline(always)]
+    pub(crate) fn warm(rows: &[Row; collision::WARM_ROWS], pair_friction: bool) -> Self {
+        const _: () = assert!(collision::IMPULSES == collision::ROWS);
+        let [record @ .., impulses] = rows;
+        let collision = match pair_friction {
+            true => Self::with_friction(record),
+            false => Self::absolute(StreamFormat::F32, record),
+        };
+        Self { impulses: vec4(StreamFormat::F32, *impulses), ..collision }
     }
 
     /// A record relative to body A, which then stands at the origin. Points at a distance of
@@ -113,8 +128,14 @@ impl Collision {
             position_a: [0.0; 3],
             position_b: vec3(numbers[relative::OFFSET]),
             contacts,
+            impulses: [0.0; CONTACT_POINTS],
         }
     }
+}
+
+/// The beat of a collision's impulses.
+pub(crate) fn impulses(impulses: [f32; CONTACT_POINTS]) -> Beat {
+    Beat(impulses.map(|impulse| word(StreamFormat::F32, impulse)))
 }
 
 /// The friction above a contact count.

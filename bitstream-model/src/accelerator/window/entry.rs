@@ -102,6 +102,7 @@ mod tests {
             position_a: [0.0; 3],
             position_b: [0.0; 3],
             contacts: [[0.0; 4]; CONTACT_POINTS],
+            impulses: [0.0; CONTACT_POINTS],
         };
         Entry::new(collision, 7, 100).map_err(|error| {
             assert_eq!((error.channel, error.beat), (0, 7));

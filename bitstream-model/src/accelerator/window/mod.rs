@@ -57,7 +57,7 @@ impl Accelerator {
             profile.collisions_per_issue,
         );
         let windows: Vec<u64> =
-            (0..self.passes()).map(|pass| self.depth(pass).window.into()).collect();
+            (0..self.arguments.passes()).map(|pass| self.depth(pass).window.into()).collect();
         // The passes of a kind are dealt out to its units in turn.
         let contact = (0..self.arguments.contact_iterations).map(|k| k % design.contact_units);
         let friction = (0..self.arguments.friction_iterations)
@@ -76,7 +76,7 @@ impl Accelerator {
         });
         let windowed = Windowed::new(
             flow,
-            self.collisions_in(),
+            self.collisions_in(0),
             self.velocities_in(),
             self.poses_in(),
             self.results_out(),

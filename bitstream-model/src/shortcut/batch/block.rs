@@ -141,6 +141,7 @@ impl Block {
             position_a: self.position_a.each_ref().map(|row| row[lane]),
             position_b: self.position_b.each_ref().map(|row| row[lane]),
             contacts: self.contacts.each_ref().map(|rows| rows.each_ref().map(|row| row[lane])),
+            impulses: [0.0; CONTACT_POINTS],
         }
     }
 

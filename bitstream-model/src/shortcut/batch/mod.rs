@@ -82,13 +82,17 @@ impl Stage {
         impulses: &mut Impulses,
     ) -> u64 {
         if self.contact {
-            solver::contact::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
+            solver::contact::<F, F, Isotropic>(
+                collision, parameters, masses, velocities, impulses, None,
+            );
             return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
         }
         if self.turning {
             *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
         }
-        solver::friction::<F, F, Isotropic>(collision, parameters, masses, velocities, impulses);
+        solver::friction::<F, F, Isotropic>(
+            collision, parameters, masses, velocities, impulses, None,
+        );
         0
     }
 }

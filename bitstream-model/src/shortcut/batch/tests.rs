@@ -125,14 +125,14 @@ impl Step {
                 let (collision, parameters, both) = arguments;
                 if pass < contact {
                     solver::contact::<F, F, Isotropic>(
-                        collision, parameters, both, &mut pair, impulses,
+                        collision, parameters, both, &mut pair, impulses, None,
                     );
                 } else {
                     if pass == contact {
                         *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
                     }
                     solver::friction::<F, F, Isotropic>(
-                        collision, parameters, both, &mut pair, impulses,
+                        collision, parameters, both, &mut pair, impulses, None,
                     );
                 }
                 if pass + 1 == contact {

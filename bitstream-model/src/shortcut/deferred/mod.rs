@@ -54,10 +54,13 @@ impl Deferred {
 
 impl Defer for Deferred {
     fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) -> bool {
-        self.active = true;
         self.computed = 0;
-        self.decoded.begin_step(arguments, shapes);
-        true
+        // Impulses that come in or go out go the long way.
+        self.active = !(arguments.warm_start || arguments.impulses_out);
+        if self.active {
+            self.decoded.begin_step(arguments, shapes);
+        }
+        self.active
     }
 
     fn takes_collisions(&self) -> bool {

@@ -63,6 +63,7 @@ pub(super) fn schedule(design: &Design) -> String {
         number("COLLISIONS", parameters.collisions.into());
         number("COLLISION_BITS", address_bits(parameters.collisions));
         number("DESIGN_INTERLOCKED", parameters.interlocked.into());
+        number("DESIGN_SMALLEST_NORMAL", parameters.smallest_normal.into());
         number("SHAPES", FLOAT.shape_capacity.into());
         number("MEMORY_ADDRESS_STAGES", parameters.address_stages.into());
         number("MEMORY_OUTPUT_STAGES", parameters.output_stages.into());

@@ -36,7 +36,7 @@ pub fn files(design: &Design) -> Vec<File> {
         modules.push(file(source.file, source.text.into()));
     }
     for pipeline in design.pipelines() {
-        let text = pipeline::pipeline(pipeline.name, &pipeline.graph, &pipeline.schedule);
+        let text = pipeline::pipeline(pipeline, design.parameters.smallest_normal);
         modules.push(file(&format!("{}.v", pipeline.name), text));
     }
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();

@@ -8,6 +8,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::design::Pipeline;
 use crate::graph::{Graph, Kind, NodeId, Operand};
 use crate::schedule::{Schedule, Unit};
 
@@ -17,9 +18,15 @@ use super::text::{Text, line};
 const LEAVES_PER_COPY: usize = 12;
 
 /// The Verilog of a pipeline.
-pub(super) fn pipeline(name: &str, graph: &Graph, schedule: &Schedule) -> String {
-    let emitter =
-        Emitter { graph, schedule, driver: driver_of(graph, schedule), copies: RefCell::default() };
+pub(super) fn pipeline(pipeline: &Pipeline, smallest_normal: bool) -> String {
+    let Pipeline { name, graph, schedule } = pipeline;
+    let emitter = Emitter {
+        graph,
+        schedule,
+        smallest_normal,
+        driver: driver_of(graph, schedule),
+        copies: RefCell::default(),
+    };
     // The body asks for the copies of the phase that it needs.
     let mut body = Text::default();
     emitter.inputs(&mut body);
@@ -57,6 +64,7 @@ fn range(width: u32) -> String {
 struct Emitter<'a> {
     graph: &'a Graph,
     schedule: &'a Schedule,
+    smallest_normal: bool,
     driver: Vec<String>,
     /// Phases, and the units that need a copy of their own of them.
     copies: RefCell<BTreeSet<(usize, String)>>,
@@ -284,7 +292,12 @@ impl Emitter<'_> {
         }
         let width = self.graph.node(first).kind.width();
         line!(text, "  wire {}{name}_y;", range(width));
-        line!(text, "  {} {name} ({}, .y({name}_y));", operator.module, ports.join(", "));
+        let parameters = if operator.smallest_normal && !self.smallest_normal {
+            "#(.SMALLEST_NORMAL(0)) "
+        } else {
+            ""
+        };
+        line!(text, "  {} {parameters}{name} ({}, .y({name}_y));", operator.module, ports.join(", "));
         for node in unit.phases.iter().flatten() {
             for part in self.parts(*node) {
                 let bits = match (width, *part) {

@@ -12,6 +12,15 @@ enum Hazards {
     Unchecked,
 }
 
+/// The result of a product or a quotient that rounds up to the smallest normal number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SmallestNormal {
+    /// The smallest normal number, as the specification says.
+    Exact,
+    /// Sometimes zero: off the specification, for the cost of the rule.
+    Dropped,
+}
+
 /// A build of the accelerator.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Build")]
@@ -35,6 +44,9 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_name = "N", default_value_t = Parameters::default().output_stages,
           value_parser = clap::value_parser!(u32).range(1..=5))]
     output_stages: u32,
+    /// Products and quotients that round up to the smallest normal number
+    #[arg(long, value_enum, default_value_t = SmallestNormal::Exact)]
+    smallest_normal: SmallestNormal,
     /// Clock that the capability register reports, kHz
     #[arg(long, value_name = "KHZ", default_value_t = Parameters::default().clock_khz)]
     clock_khz: u32,
@@ -49,6 +61,7 @@ impl BuildArgs {
             interlocked: self.hazards == Hazards::Interlocked,
             address_stages: self.address_stages,
             output_stages: self.output_stages,
+            smallest_normal: self.smallest_normal == SmallestNormal::Exact,
             clock_khz: self.clock_khz,
         };
         parameters.check()?;

@@ -15,7 +15,7 @@ use zynq_pgs::StepParameters;
 
 use self::side::{Measured, Side, World};
 use self::spec::SideSpec;
-use crate::common::{BoardName, CommonArgs};
+use crate::common::{AcceleratorChoice, BoardName, CommonArgs};
 use crate::deviation::StateDeviation;
 use crate::failure::{Failure, Verdict};
 use crate::interrupt::Interrupt;
@@ -32,6 +32,7 @@ Examples:
   pgs compare float half --input vectors/full_step186
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
+  pgs compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmetic), interlocked,
@@ -40,7 +41,7 @@ length-width=BITS, address-width=BITS, threads=N and lanes=on|off. The order of 
 is one of auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest,
 body-by-body-newest, colours. Without an order, a board that waits on hazards takes the collisions
 as given, so that two such boards solve them in the same order. Each board detects its own
-collisions.
+collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in model.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1) and leave out components where A is 0. A velocity is within 1 % if it
@@ -154,7 +155,7 @@ pub(crate) fn run(
     };
     let mut parameters = args.deadline.apply(args.solver.apply(parameters));
     parameters.verify_order |= args.verify;
-    let open = |name, spec: SideSpec| {
+    let open = |name, spec: SideSpec, accelerator: &AcceleratorChoice| {
         let world = |opened: &_| match &folder {
             Some(folder) => {
                 let capacity = board_shapes(opened);
@@ -166,9 +167,11 @@ pub(crate) fn run(
                 args.scene.build(&spec.build).map(Box::new).map(World::Scene)
             }
         };
+        let common = CommonArgs { accelerator: accelerator.clone(), ..common.clone() };
         Side::open(name, spec, common, world, parameters.gravity)
     };
-    let mut sides = (open("A", args.a)?, open("B", args.b)?);
+    let mut sides =
+        (open("A", args.a, &AcceleratorChoice::Model)?, open("B", args.b, &common.accelerator)?);
 
     let steps = if folder.is_some() { 1 } else { args.steps };
     let every = args.every.unwrap_or(steps.div_ceil(ROWS));

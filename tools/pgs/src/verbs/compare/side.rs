@@ -115,11 +115,11 @@ impl<'a> Side<'a> {
     pub(super) fn open(
         name: &'static str,
         spec: SideSpec,
-        common: &CommonArgs,
+        common: CommonArgs,
         world: impl FnOnce(&OpenBoard) -> Result<World<'a>, Failure>,
         gravity: [f32; 3],
     ) -> Result<Self, Failure> {
-        let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
+        let common = CommonArgs { board: BoardName::Emulated, ..common };
         let begin = || {
             let mut opened = board::open(&common, &spec.build)?;
             let world = world(&opened)?;

@@ -59,6 +59,13 @@ pub(crate) struct FormatsArgs {
     build: BuildArgs,
 }
 
+impl FormatsArgs {
+    /// Whether it takes steps before the one that it measures.
+    pub(crate) const fn takes_steps(&self) -> bool {
+        self.input.is_none()
+    }
+}
+
 /// The input of a step.
 struct Step {
     bodies: Vec<Body>,

@@ -1,0 +1,88 @@
+//! Impulses of collisions, as a step gives them out and as the next one begins with them.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::{CONTACT_POINTS, Collision, Collisions};
+
+/// The impulses of a collision, accumulated over the passes of a step, N s.
+///
+/// A step gives them out with [`StepParameters::impulses_out`] and begins with them with
+/// [`StepParameters::warm_start`]. The words lie in this order, without a gap.
+///
+/// [`StepParameters::impulses_out`]: crate::StepParameters::impulses_out
+/// [`StepParameters::warm_start`]: crate::StepParameters::warm_start
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Impulses {
+    /// Along the normal, at each contact point. Positive pushes body A along the normal. The elements
+    /// behind the number of points are 0 where they come out, and ignored where they go in.
+    pub normal: [f32; CONTACT_POINTS],
+    /// Along the two tangents of the collision (specification, §7), at the centre of its points.
+    pub friction: [f32; 2],
+}
+
+impl Impulses {
+    /// No impulse: the cold start of a collision.
+    pub const ZERO: Self = Self { normal: [0.0; CONTACT_POINTS], friction: [0.0; 2] };
+
+    /// The impulses times a factor. A pile comes to rest sooner with 0.85 of the last step's.
+    #[must_use]
+    pub fn scaled(self, factor: f32) -> Self {
+        Self {
+            normal: self.normal.map(|impulse| impulse * factor),
+            friction: self.friction.map(|impulse| impulse * factor),
+        }
+    }
+
+    /// The impulses without elements behind the number of points, which count for nothing.
+    pub(crate) fn used(self, collision: &Collision) -> Self {
+        let points = collision.points() as usize;
+        if points == 0 {
+            return Self::ZERO;
+        }
+        let mut normal = self.normal;
+        normal.iter_mut().skip(points).for_each(|impulse| *impulse = 0.0);
+        Self { normal, ..self }
+    }
+
+    /// Whether all are numbers.
+    pub(crate) fn are_finite(&self) -> bool {
+        self.normal.iter().chain(&self.friction).all(|impulse| impulse.is_finite())
+    }
+}
+
+/// Collisions with the impulses that a step is to begin with.
+#[derive(Debug, Clone, Copy)]
+pub struct WarmCollisions<'a, C: ?Sized> {
+    /// The collisions.
+    pub collisions: &'a C,
+    /// The impulses of each collision; a step refuses another number of them.
+    pub impulses: &'a [Impulses],
+}
+
+impl<C: Collisions + ?Sized> Collisions for WarmCollisions<'_, C> {
+    fn len(&self) -> usize {
+        self.collisions.len()
+    }
+
+    #[inline]
+    fn collision(&self, index: usize) -> Collision {
+        self.collisions.collision(index)
+    }
+
+    fn structures(&self) -> Option<super::Structures<'_>> {
+        self.collisions.structures()
+    }
+
+    fn prefetch(&self, index: usize) {
+        self.collisions.prefetch(index);
+    }
+
+    fn lengths_agree(&self) -> bool {
+        self.collisions.lengths_agree() && self.impulses.len() == self.collisions.len()
+    }
+
+    fn impulses(&self, index: usize) -> Impulses {
+        self.impulses[index]
+    }
+}

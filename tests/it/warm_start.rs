@@ -1,0 +1,293 @@
+//! Compares the warm start of interface 1.2 with the direct solver, bit for bit, on every board and in
+//! every order, and holds its passes, bytes and cycles against the specification.
+#![cfg(feature = "emulation")]
+
+use crate::common::direct::{direct_step, direct_step_from};
+use crate::common::random_scene::{scene, shapes};
+use crate::common::{bits, open_with, ordered};
+use bitstream_model::interface::extension::Extensions;
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
+use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan, Hazards};
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
+use zynq_pgs::{
+    Accelerator, Body, Collision, Error, Excess, Fault, Impulses, InputError, StepParameters,
+    WarmCollisions,
+};
+
+fn words(impulses: &[Impulses]) -> &[u32] {
+    bytemuck::cast_slice(impulses)
+}
+
+fn warm(order: Order) -> StepParameters {
+    ordered(order).with_warm_start(true).with_impulses_out(true)
+}
+
+fn boards() -> Vec<BoardConfig> {
+    let mut boards = Vec::new();
+    for profile in [&FLOAT, &NAIVE] {
+        for (shortcuts, lanes, threads) in [(false, false, 1), (true, true, 1), (true, true, 2)] {
+            let inertia = Inertia::World;
+            let usual = BoardConfig { profile, inertia, ..BoardConfig::default() };
+            boards.push(BoardConfig { shortcuts, lanes, threads, ..usual });
+        }
+    }
+    boards
+}
+
+/// A scene with an empty collision.
+fn world() -> (Vec<Body>, Vec<Collision>) {
+    let (bodies, mut collisions) = scene(5);
+    let empty = Collision { count: 0, body_b: u32::MAX, ..collisions[5] };
+    collisions.insert(6, empty);
+    (bodies, collisions)
+}
+
+/// Steps with the impulses of the step before.
+fn three_steps(
+    accelerator: &mut Accelerator,
+    bodies: &mut [Body],
+    collisions: &[Collision],
+    parameters: &StepParameters,
+) -> Vec<Impulses> {
+    let mut impulses = vec![Impulses::ZERO; collisions.len()];
+    for _ in 0..3 {
+        let warm = WarmCollisions { collisions, impulses: &impulses };
+        accelerator.step(bodies, &warm, parameters).expect("a step");
+        impulses = accelerator.impulses().iter().map(|of| of.scaled(0.85)).collect();
+    }
+    impulses
+}
+
+fn three_direct_steps(
+    bodies: &mut [Body],
+    collisions: &[Collision],
+    parameters: &StepParameters,
+) -> Vec<Impulses> {
+    let mut impulses = vec![Impulses::ZERO; collisions.len()];
+    for _ in 0..3 {
+        let given = Some(&impulses[..]);
+        let out = direct_step_from(given, bodies, collisions, &shapes(), parameters);
+        impulses = out.iter().map(|of| of.scaled(0.85)).collect();
+    }
+    impulses
+}
+
+/// The same, with the collisions of each step in the order that the board gets.
+fn three_direct_steps_in(
+    order: Order,
+    bodies: &mut [Body],
+    collisions: &[Collision],
+    parameters: &StepParameters,
+) -> Vec<Impulses> {
+    let (mut buffers, mut orderer) = (InputBuffers::new(), Orderer::new());
+    // 324 cycles of the contact pipeline, one collision every 2.
+    let window = IssueWindow::new(162, 1).expect("a window");
+    let mut impulses = vec![Impulses::ZERO; collisions.len()];
+    for _ in 0..3 {
+        let input = buffers.gather(bodies, collisions, &shapes());
+        let entries = orderer.order(&input, order, window).expect("an order").iter().flatten();
+        let sent: Vec<usize> = entries.map(|index| index as usize).collect();
+        let in_order: Vec<Collision> = sent.iter().map(|index| collisions[*index]).collect();
+        let given: Vec<Impulses> = sent.iter().map(|index| impulses[*index]).collect();
+        let out = direct_step_from(Some(&given), bodies, &in_order, &shapes(), parameters);
+        for (of, index) in out.iter().zip(&sent) {
+            impulses[*index] = of.scaled(0.85);
+        }
+    }
+    impulses
+}
+
+#[test]
+fn the_impulses_take_the_place_of_the_computed_ones_in_the_first_pass_of_each_kind() {
+    let (bodies, collisions) = world();
+    for (contact, friction) in [(4, 4), (1, 0), (0, 2), (0, 0)] {
+        let iterations = |parameters: StepParameters| {
+            parameters.with_contact_iterations(contact).with_friction_iterations(friction)
+        };
+        let parameters = iterations(warm(Order::AsGiven));
+        let mut expected = bodies.clone();
+        let impulses = three_direct_steps(&mut expected, &collisions, &parameters);
+        for config in boards() {
+            let (board, mut accelerator) = open_with(config, None, &shapes());
+            let mut found = bodies.clone();
+            let out = three_steps(&mut accelerator, &mut found, &collisions, &parameters);
+            assert_eq!(bits(&found), bits(&expected), "{contact} + {friction}, {config:?}");
+            assert_eq!(words(&out), words(&impulses), "{contact} + {friction}, {config:?}");
+            assert_eq!(board.violations(), []);
+        }
+    }
+}
+
+#[test]
+fn impulses_follow_their_collisions_through_every_order() {
+    let (bodies, collisions) = world();
+    for order in [Order::HazardFreeNearby, Order::HazardFree, Order::Colours] {
+        let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+        let (_board, mut accelerator) = open_with(config, None, &shapes());
+        let parameters = warm(order);
+        let mut found = bodies.clone();
+        let out = three_steps(&mut accelerator, &mut found, &collisions, &parameters);
+        let mut expected = bodies.clone();
+        let impulses = three_direct_steps_in(order, &mut expected, &collisions, &parameters);
+        assert_eq!(bits(&found), bits(&expected), "{order:?}");
+        assert_eq!(words(&out), words(&impulses), "{order:?}");
+        assert_eq!(out[6], Impulses::ZERO, "an empty collision has none");
+        let unchecked = BoardConfig { hazards: Hazards::Unchecked, ..config };
+        if order.is_hazard_free() {
+            let (_board, mut accelerator) = open_with(unchecked, None, &shapes());
+            let mut same = bodies.clone();
+            let also = three_steps(&mut accelerator, &mut same, &collisions, &parameters);
+            assert_eq!(bits(&same), bits(&found), "{order:?}");
+            assert_eq!(words(&also), words(&out), "{order:?}");
+        }
+    }
+}
+
+#[test]
+fn impulses_come_out_of_a_cold_step_too_and_change_nothing() {
+    let (bodies, collisions) = world();
+    let parameters = ordered(Order::AsGiven);
+    let mut expected = bodies.clone();
+    direct_step(&mut expected, &collisions, &shapes(), &parameters);
+    let mut again = bodies.clone();
+    let impulses = direct_step_from(None, &mut again, &collisions, &shapes(), &parameters);
+    for config in boards() {
+        let (_board, mut accelerator) = open_with(config, None, &shapes());
+        let mut found = bodies.clone();
+        let cold = accelerator.step(&mut found, &collisions, &parameters).expect("a step");
+        assert_eq!(bits(&found), bits(&expected));
+        assert!(accelerator.impulses().is_empty(), "nobody asked for them");
+        let mut found = bodies.clone();
+        let parameters = parameters.with_impulses_out(true);
+        let out = accelerator.step(&mut found, &collisions, &parameters).expect("a step");
+        assert_eq!(bits(&found), bits(&expected));
+        assert_eq!(words(accelerator.impulses()), words(&impulses));
+        assert_eq!(out.passes, cold.passes);
+        assert_eq!(out.cycles.work, cold.cycles.work, "they leave beside the passes");
+        let beats = 2 * collisions.len() as u64;
+        assert_eq!(out.bytes_from_device, cold.bytes_from_device + 16 * beats);
+    }
+}
+
+#[test]
+fn a_warm_start_costs_a_pass_of_each_kind() {
+    let (bodies, collisions) = scene(5);
+    for (profile, interval) in [(&FLOAT, 2), (&NAIVE, 32)] {
+        let inertia = Inertia::World;
+        let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+        let (_board, mut accelerator) = open_with(config, None, &shapes());
+        let mut step = |parameters: &StepParameters| {
+            accelerator.step(&mut bodies.clone(), &collisions, parameters).expect("a step")
+        };
+        let cold = step(&ordered(Order::AsGiven));
+        let hot = step(&ordered(Order::AsGiven).with_warm_start(true));
+        assert_eq!((cold.passes, hot.passes), (8, 10));
+        let count = collisions.len() as u64;
+        let fills = u64::from(profile.contact.fill + profile.friction.fill);
+        assert_eq!(hot.cycles.work, cold.cycles.work + 2 * count * interval + fills);
+        // Eight beats a collision in each of the two passes.
+        assert_eq!(hot.bytes_to_device, cold.bytes_to_device + 2 * 16 * 8 * count);
+    }
+}
+
+#[test]
+fn a_collision_without_impulses_begins_with_none() {
+    let (bodies, collisions) = scene(5);
+    let (_board, mut accelerator) = {
+        let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+        open_with(config, None, &shapes())
+    };
+    let mut found = bodies.clone();
+    let parameters = ordered(Order::AsGiven).with_warm_start(true);
+    accelerator.step(&mut found, &collisions, &parameters).expect("a step");
+    let mut expected = bodies;
+    direct_step(&mut expected, &collisions, &shapes(), &ordered(Order::AsGiven));
+    // An impulse of 0 is added, which may turn a -0 into a 0.
+    let zero = |words: Vec<u32>| -> Vec<u32> {
+        words.into_iter().map(|word| if word == 1 << 31 { 0 } else { word }).collect()
+    };
+    assert_eq!(zero(bits(&found)), zero(bits(&expected)));
+}
+
+fn refused(
+    config: BoardConfig,
+    impulses: &[Impulses],
+    parameters: &StepParameters,
+) -> InputError {
+    let (bodies, collisions) = scene(5);
+    let (_board, mut accelerator) = open_with(config, None, &shapes());
+    let mut found = bodies.clone();
+    let warm = WarmCollisions { collisions: &collisions, impulses };
+    match accelerator.step(&mut found, &warm, parameters) {
+        Err(Error::Input(input)) => {
+            assert_eq!(bits(&found), bits(&bodies), "nothing has changed");
+            input
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn impulses_that_are_no_numbers_or_of_another_number_are_refused() {
+    let count = scene(5).1.len();
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let parameters = warm(Order::AsGiven);
+    let few = vec![Impulses::ZERO; count - 1];
+    let found = refused(config, &few, &parameters);
+    assert!(matches!(found, InputError::UnequalLengths { what: "collisions" }), "{found}");
+    for set in [
+        (|of: &mut Impulses| of.normal[0] = f32::NAN) as fn(&mut Impulses),
+        |of| of.friction[1] = f32::INFINITY,
+    ] {
+        let mut impulses = vec![Impulses::ZERO; count];
+        set(&mut impulses[17]);
+        let found = refused(config, &impulses, &parameters);
+        assert_eq!(found, InputError::ImpulseNotFinite { collision: 17 });
+    }
+}
+
+#[test]
+fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
+    let count = scene(5).1.len();
+    let impulses = vec![Impulses::ZERO; count];
+    let inertia = Inertia::World;
+    let usual = BoardConfig { inertia, ..BoardConfig::default() };
+    let old = BoardConfig { extensions: Extensions::NONE, ..usual };
+    let others = [&HALF, &MIXED, &WINDOWED].map(|profile| BoardConfig { profile, ..usual });
+    for config in others.into_iter().chain([old]) {
+        for (parameters, asked) in [
+            (ordered(Order::AsGiven).with_warm_start(true), "a warm start"),
+            (ordered(Order::AsGiven).with_impulses_out(true), "the impulses of the collisions"),
+        ] {
+            let found = refused(config, &impulses, &parameters);
+            let excess = found.excess();
+            assert!(
+                matches!(excess, Some(Excess::MissingExtension { extension }) if *extension == *asked),
+                "{found}"
+            );
+            let text = found.to_string();
+            assert!(text.contains("naive") && text.contains("float"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn impulses_of_a_failed_step_are_not_given_out() {
+    let (bodies, collisions) = scene(5);
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let (board, mut accelerator): (EmulatedBoard, _) = open_with(config, None, &shapes());
+    let parameters = warm(Order::AsGiven);
+    accelerator.step(&mut bodies.clone(), &collisions, &parameters).expect("a step");
+    let before = accelerator.impulses().to_vec();
+    let plan: FaultPlan =
+        "corrupt=0x00400000@dma3.mm2s,phase=contact1,beat=3".parse().expect("a plan");
+    board.inject(plan);
+    let failed = accelerator.step(&mut bodies.clone(), &collisions, &parameters);
+    let error = failed.expect_err("the impulse of a collision was corrupted");
+    assert!(
+        matches!(&error, Error::Step { fault, .. } if matches!(**fault, Fault::Checksum { .. })),
+        "{error}"
+    );
+    assert_eq!(words(accelerator.impulses()), words(&before));
+    accelerator.step(&mut bodies.clone(), &collisions, &parameters).expect("the next works");
+}
