@@ -126,6 +126,10 @@ typedef struct zpgs_parameters {
     uint32_t deadline_ms;
     // Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     uint32_t retries;
+    // Flag: begin with the impulses of `zpgs_collisions`, in one more pass of each kind.
+    uint32_t warm_start;
+    // Flag: keep the impulses of the step for `zpgs_read_impulses`.
+    uint32_t impulses_out;
 } zpgs_parameters;
 
 // An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
@@ -180,6 +184,9 @@ typedef struct zpgs_collisions {
     size_t count;
     // The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     struct zpgs_strided_const collisions;
+    // The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each collision.
+    // Null without a warm start.
+    struct zpgs_strided_const impulses;
 } zpgs_collisions;
 
 // Counts and times of one step. The caller sets `size` to `sizeof(zpgs_report)` before the call.
@@ -231,6 +238,15 @@ typedef struct zpgs_collision {
     // The contact points. The elements from `count` on are ignored, but must be initialised.
     struct zpgs_contact contacts[ZPGS_CONTACT_POINTS];
 } zpgs_collision;
+
+// The impulses of a collision, accumulated over the passes of a step, N s.
+typedef struct zpgs_impulses {
+    // Along the normal, at each contact point; positive pushes body A along the normal. The elements
+    // behind the number of points come out as 0 and are ignored where they go in.
+    float normal[ZPGS_CONTACT_POINTS];
+    // Along the two tangents of the collision, at the centre of its points.
+    float friction[2];
+} zpgs_impulses;
 
 #ifdef __cplusplus
 extern "C" {
@@ -331,6 +347,17 @@ enum zpgs_status zpgs_submit(struct zpgs_accelerator *accelerator,
 enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
                            const struct zpgs_bodies *bodies,
                            struct zpgs_report *report);
+
+// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
+// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. Not while a
+// step is in flight. For the warm start of the next step, sounds, damage.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
+// `zpgs_strided` describes, and no other thread uses its elements during the call.
+enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
+                                    struct zpgs_strided impulses,
+                                    size_t count);
 
 // Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 // board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.

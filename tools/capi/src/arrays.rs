@@ -63,4 +63,7 @@ pub struct CollisionArray {
     pub count: usize,
     /// The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     pub collisions: StridedConst,
+    /// The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each collision.
+    /// Null without a warm start.
+    pub impulses: StridedConst,
 }

@@ -34,9 +34,24 @@ pub struct Collision {
     pub contacts: [Contact; ZPGS_CONTACT_POINTS],
 }
 
-/// The driver reads the collisions of C where they lie.
+/// The impulses of a collision, accumulated over the passes of a step, N s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C)]
+pub struct Impulses {
+    /// Along the normal, at each contact point; positive pushes body A along the normal. The elements
+    /// behind the number of points come out as 0 and are ignored where they go in.
+    pub normal: [f32; ZPGS_CONTACT_POINTS],
+    /// Along the two tangents of the collision, at the centre of its points.
+    pub friction: [f32; 2],
+}
+
+/// The driver reads the collisions and impulses of C where they lie.
 const _: () = {
-    use zynq_pgs::{CONTACT_POINTS, Collision as Driver, Contact as Point};
+    use zynq_pgs::{CONTACT_POINTS, Collision as Driver, Contact as Point, Impulses as Sums};
+    assert!(size_of::<Impulses>() == size_of::<Sums>());
+    assert!(align_of::<Impulses>() == align_of::<Sums>());
+    assert!(offset_of!(Impulses, normal) == offset_of!(Sums, normal));
+    assert!(offset_of!(Impulses, friction) == offset_of!(Sums, friction));
     assert!(ZPGS_CONTACT_POINTS == CONTACT_POINTS);
     assert!(size_of::<Collision>() == size_of::<Driver>());
     assert!(align_of::<Collision>() == align_of::<Driver>());

@@ -8,9 +8,11 @@
 
 use std::ffi::{CStr, c_char};
 
+use zynq_pgs::StepParameters;
+
 use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
 use crate::barrier::{call, call_with};
-use crate::collision::{Collision, count_with_friction};
+use crate::collision::{Collision, Impulses, count_with_friction};
 use crate::failure::Failure;
 use crate::handle::AcceleratorHandle;
 use crate::last_error;
@@ -188,6 +190,7 @@ pub unsafe extern "C" fn zpgs_step(
         // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let parameters = parameters.driver()?;
+        check_impulses(&collisions, &parameters)?;
         let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
@@ -219,7 +222,9 @@ pub unsafe extern "C" fn zpgs_submit(
         // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
         // during the call.
         let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
-        state.submit(&bodies, &collisions, &parameters.driver()?)
+        let parameters = parameters.driver()?;
+        check_impulses(&collisions, &parameters)?;
+        state.submit(&bodies, &collisions, &parameters)
     })
 }
 
@@ -254,6 +259,36 @@ pub unsafe extern "C" fn zpgs_wait(
     })
 }
 
+/// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
+/// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. Not while a
+/// step is in flight. For the warm start of the next step, sounds, damage.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
+/// `zpgs_strided` describes, and no other thread uses its elements during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_read_impulses(
+    accelerator: *mut AcceleratorHandle,
+    impulses: Strided,
+    count: usize,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        let found = state.idle()?.impulses();
+        if found.len() != count {
+            return Err(Failure::argument(format!(
+                "found {count} as the number of impulses, but the last step with impulses_out had {} \
+                 collisions: give that number",
+                found.len()
+            )));
+        }
+        // SAFETY: `count` elements that this call alone uses: `# Safety` of this function.
+        unsafe { memory::store_impulses(impulses, found) }
+    })
+}
+
 /// Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 /// board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
 /// The step after it is not cancelled. Any thread may call it at any time, also during another
@@ -269,6 +304,20 @@ pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> S
         unsafe { memory::handle(accelerator) }?.cancel();
         Ok(())
     })
+}
+
+/// Refuses a warm start without impulses, which would be a cold one that takes longer.
+fn check_impulses(
+    collisions: &CollisionsView<'_>,
+    parameters: &StepParameters,
+) -> Result<(), Failure> {
+    if parameters.warm_start && !collisions.has_impulses() {
+        return Err(Failure::argument(
+            "a warm start without impulses: give those of zpgs_collisions, or leave warm_start 0"
+                .to_owned(),
+        ));
+    }
+    Ok(())
 }
 
 /// Reads and checks the caller's bodies.
@@ -300,8 +349,10 @@ unsafe fn read_collisions<'a>(
     pointer: *const CollisionArray,
 ) -> Result<CollisionsView<'a>, Failure> {
     let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };
+    let impulses = StridedConst { data: std::ptr::null(), stride: size_of::<Impulses>() };
+    let nothing = CollisionArray { size: 0, count: 0, collisions, impulses };
     // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
-    let array = unsafe { memory::read(pointer, CollisionArray { size: 0, count: 0, collisions }) }?;
+    let array = unsafe { memory::read(pointer, nothing) }?;
     // SAFETY: the array is as the structure describes: `# Safety` of this function.
     unsafe { CollisionsView::new(array) }
 }

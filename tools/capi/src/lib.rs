@@ -20,7 +20,7 @@ mod shape;
 mod status;
 
 pub use arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
-pub use collision::{Collision, Contact, ZPGS_CONTACT_POINTS};
+pub use collision::{Collision, Contact, Impulses, ZPGS_CONTACT_POINTS};
 pub use exports::*;
 pub use handle::AcceleratorHandle;
 pub use parameters::{Order, Parameters};

@@ -97,6 +97,10 @@ pub struct Parameters {
     pub deadline_ms: u32,
     /// Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     pub retries: u32,
+    /// Flag: begin with the impulses of `zpgs_collisions`, in one more pass of each kind.
+    pub warm_start: u32,
+    /// Flag: keep the impulses of the step for `zpgs_read_impulses`.
+    pub impulses_out: u32,
 }
 
 impl Default for Parameters {
@@ -120,6 +124,8 @@ impl Default for Parameters {
             order: Order::Automatic as u32,
             deadline_ms: 0,
             retries: driver.retries,
+            warm_start: driver.warm_start.into(),
+            impulses_out: driver.impulses_out.into(),
         }
     }
 }
@@ -152,7 +158,9 @@ impl Parameters {
             .with_verify_order(flag("verify_order", given.verify_order)?)
             .with_order(order.driver())
             .with_deadline((given.deadline_ms > 0).then_some(deadline))
-            .with_retries(given.retries))
+            .with_retries(given.retries)
+            .with_warm_start(flag("warm_start", given.warm_start)?)
+            .with_impulses_out(flag("impulses_out", given.impulses_out)?))
     }
 }
 
@@ -194,6 +202,8 @@ mod tests {
             order: Order::HazardFree as u32,
             deadline_ms: 7,
             retries: 8,
+            warm_start: 1,
+            impulses_out: 1,
         };
         let expected = StepParameters::default()
             .with_time_step(0.5)
@@ -211,7 +221,9 @@ mod tests {
             .with_verify_order(true)
             .with_order(order::Order::HazardFree)
             .with_deadline(Duration::from_millis(7))
-            .with_retries(8);
+            .with_retries(8)
+            .with_warm_start(true)
+            .with_impulses_out(true);
         assert_eq!(given.driver(), Ok(expected));
     }
 

@@ -80,6 +80,7 @@ fn collisions(all: &[Collision]) -> CollisionArray {
         size: size_of::<CollisionArray>(),
         count: all.len(),
         collisions: StridedConst { data: all.as_ptr().cast(), stride: size_of::<Collision>() },
+        impulses: StridedConst { data: null(), stride: 0 },
     }
 }
 
@@ -232,6 +233,57 @@ fn submit_and_wait_are_a_step_and_one_step_is_in_flight() {
     assert_eq!(open.wait(&bodies), Status::Ok, "{}", open.text());
     assert_eq!(crates, stepped());
     assert_eq!(open.submit(&arrays(&mut crates), &all), Status::Ok, "and closed in flight");
+}
+
+/// The impulses of two steps of the driver, the second of which begins with those of the first.
+fn warm_steps(parameters: &StepParameters) -> [zynq_pgs::Impulses; 2] {
+    let mut board =
+        Accelerator::open(OpenOptions::emulated("float").expect("a build")).expect("open");
+    board.set_shapes(&SHAPES.map(zynq_pgs::Shape::from)).expect("shapes");
+    let mut bodies = world().map(|body| Body {
+        pose: Pose { position: body.position, orientation: body.orientation },
+        velocity: Velocity { linear: body.linear, angular: body.angular },
+        shape: body.shape,
+    });
+    let Collision { body_a, body_b, normal, count, contacts } = collision();
+    let contacts = contacts.map(|Contact { point, distance }| zynq_pgs::Contact { point, distance });
+    let collisions = [zynq_pgs::Collision { body_a, body_b, normal, count, contacts }];
+    let mut impulses = zynq_pgs::Impulses::ZERO;
+    [(); 2].map(|()| {
+        let warm = zynq_pgs::WarmCollisions { collisions: &collisions[..], impulses: &[impulses] };
+        board.step(&mut bodies[..], &warm, parameters).expect("a step");
+        impulses = board.impulses()[0];
+        impulses
+    })
+}
+
+#[test]
+fn impulses_go_in_and_come_out_at_their_strides() {
+    let (open, mut crates, all) = (Open::new("emulated:float"), world(), [collision()]);
+    let parameters = Parameters { warm_start: 1, impulses_out: 1, ..defaults() };
+    let driver = StepParameters::default().with_warm_start(true).with_impulses_out(true);
+    // A number of the engine's behind the impulses.
+    let mut kept = [(Impulses::default(), 5_u32)];
+    let stride = size_of_val(&kept[0]);
+    for expected in warm_steps(&driver) {
+        let data: *mut c_void = (&raw mut kept[0].0).cast();
+        let mut given = collisions(&all);
+        given.impulses = StridedConst { data, stride };
+        let status = open.step(&arrays(&mut crates), &given, &parameters);
+        assert_eq!(status, Status::Ok, "{}", open.text());
+        let out = Strided { data, stride };
+        assert_eq!(made!(zpgs_read_impulses(open.0, out, 1)), Status::Ok, "{}", open.text());
+        let (Impulses { normal, friction }, engines) = kept[0];
+        assert_eq!((normal, friction, engines), (expected.normal, expected.friction, 5));
+        assert!(normal[0] > 0.0);
+    }
+    let none = Strided { data: null_mut(), stride: 0 };
+    assert_eq!(made!(zpgs_read_impulses(open.0, none, 2)), Status::Argument);
+    assert!(open.text().contains("had 1 collisions"), "{}", open.text());
+    assert_eq!(made!(zpgs_read_impulses(open.0, none, 1)), Status::NullPointer);
+    let status = open.step(&arrays(&mut crates), &collisions(&all), &parameters);
+    assert_eq!(status, Status::Argument);
+    assert!(open.text().contains("a warm start without impulses"), "{}", open.text());
 }
 
 #[test]

@@ -13,4 +13,4 @@ mod view;
 
 pub(crate) use pointer::{close, handle, open_into, slice, text};
 pub(crate) use sized::{Out, read};
-pub(crate) use view::{BodiesView, CollisionsView};
+pub(crate) use view::{BodiesView, CollisionsView, store_impulses};

@@ -26,11 +26,11 @@ pub(crate) unsafe trait Growing: Copy {
     const NAME: &'static str;
 }
 
-// SAFETY: `repr(C)`, a `usize` and 18 numbers of 32 bits.
+// SAFETY: `repr(C)`, a `usize` and 20 numbers of 32 bits.
 unsafe impl Growing for Parameters {
     const NAME: &'static str = "zpgs_parameters";
 }
-const _: () = assert!(size_of::<Parameters>() == size_of::<usize>() + 18 * 4);
+const _: () = assert!(size_of::<Parameters>() == size_of::<usize>() + 20 * 4);
 
 // SAFETY: `repr(C)`, a `usize` and 9 numbers of 64 bits.
 unsafe impl Growing for Report {
@@ -44,11 +44,11 @@ unsafe impl Growing for BodyArrays {
 }
 const _: () = assert!(size_of::<BodyArrays>() == 12 * size_of::<usize>());
 
-// SAFETY: `repr(C)`, two `usize` and a pair of a raw pointer and a `usize`.
+// SAFETY: `repr(C)`, two `usize` and two pairs of a raw pointer and a `usize`.
 unsafe impl Growing for CollisionArray {
     const NAME: &'static str = "zpgs_collisions";
 }
-const _: () = assert!(size_of::<CollisionArray>() == 4 * size_of::<usize>());
+const _: () = assert!(size_of::<CollisionArray>() == 6 * size_of::<usize>());
 
 /// Checks the size that a caller gives.
 fn check_size<T: Growing>(size: usize) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use std::ptr::NonNull;
 use std::slice;
 
-use zynq_pgs::{Bodies, Body, Collision, Collisions, Pose, Structures, Velocity};
+use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Pose, Structures, Velocity};
 
 use super::pointer::{extent, misaligned};
 use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
@@ -174,16 +174,17 @@ pub(crate) struct CollisionsView<'a> {
     column: Column<Collision>,
     /// All of them, where they lie without gaps.
     dense: Option<&'a [Collision]>,
+    impulses: Option<Column<Impulses>>,
 }
 
 impl CollisionsView<'_> {
-    /// Checks the array.
+    /// Checks the arrays.
     ///
     /// # Safety
-    /// The array is as [`CollisionArray`] describes, and lives as long as the view is in use.
-    /// Nothing writes it meanwhile.
+    /// The arrays are as [`CollisionArray`] describes, and live as long as the view is in use.
+    /// Nothing writes them meanwhile.
     pub(crate) unsafe fn new(array: CollisionArray) -> Result<Self, Failure> {
-        let CollisionArray { count, collisions, .. } = array;
+        let CollisionArray { count, collisions, impulses, .. } = array;
         // SAFETY: the caller promises the array; a `Collision` takes every bit pattern.
         let column = unsafe { Column::new(collisions, count, "collisions") }?;
         let dense = if column.stride == size_of::<Collision>() || count == 0 {
@@ -193,8 +194,33 @@ impl CollisionsView<'_> {
         } else {
             None
         };
-        Ok(Self { count, column, dense })
+        let impulses = match impulses.data.is_null() {
+            true => None,
+            // SAFETY: the caller promises the array; floats take every bit pattern.
+            false => Some(unsafe { Column::new(impulses, count, "impulses") }?),
+        };
+        Ok(Self { count, column, dense, impulses })
     }
+
+    /// Whether a step can begin with the impulses of every collision.
+    pub(crate) fn has_impulses(&self) -> bool {
+        self.impulses.is_some() || self.count == 0
+    }
+}
+
+/// Stores impulses in the caller's array.
+///
+/// # Safety
+/// `array` is null or leads to as many `zpgs_impulses` as there are impulses, as [`Strided`]
+/// describes, and nothing else reads or writes them meanwhile.
+pub(crate) unsafe fn store_impulses(array: Strided, impulses: &[Impulses]) -> Result<(), Failure> {
+    // SAFETY: the caller promises the array; floats take every bit pattern.
+    let mut column = unsafe { Column::new(array.into(), impulses.len(), "impulses") }?;
+    for (index, of) in impulses.iter().enumerate() {
+        // SAFETY: the index is below the count, and this call alone uses the array.
+        unsafe { column.set(index, *of) };
+    }
+    Ok(())
 }
 
 // SAFETY: the view only reads, and nothing writes the array while it is in use (`new`).
@@ -213,6 +239,12 @@ impl Collisions for CollisionsView<'_> {
 
     fn structures(&self) -> Option<Structures<'_>> {
         self.dense.map(Structures::Array)
+    }
+
+    fn impulses(&self, index: usize) -> Impulses {
+        assert!(index < self.count, "collision {index} of {}", self.count);
+        // SAFETY: the index is below the count, and nothing writes the array.
+        self.impulses.as_ref().map_or(Impulses::ZERO, |column| unsafe { column.get(index) })
     }
 }
 
@@ -283,6 +315,7 @@ mod tests {
                 data: all.as_ptr().cast(),
                 stride: times * size_of::<Collision>(),
             },
+            impulses: StridedConst { data: std::ptr::null(), stride: 0 },
         };
         // SAFETY: four elements.
         let dense = unsafe { CollisionsView::new(array(4, 1)) }.expect("an array");
