@@ -87,7 +87,7 @@ bool Table::failed() const {
 void Table::print() const {
     std::printf("Bullet %d.%02d; board %s, zynq-pgs %s\n", BT_BULLET_VERSION / 100, BT_BULLET_VERSION % 100,
                 m_settings.board.c_str(), zpgs_version());
-    std::printf("%-52s %10s %10s %-5s  %s\n", "", "Bullet", "board", "", "limit of the board");
+    std::printf("%-52s %10s %10s %-6s %s\n", "", "Bullet", "board", "", "limit of the board");
     std::string scene;
     for (const Row &row : m_rows) {
         if (row.scene != scene) {
@@ -95,10 +95,11 @@ void Table::print() const {
             for (const Scene &known : scenes())
                 if (scene == known.name) std::printf("%s: %s\n", known.name, known.title);
         }
-        const std::string limit = words(row.limit), end = verdict(row);
-        std::printf("  %-50s %10s %10s %-5s  %s%s%s\n", row.measure.c_str(), number(row.bullet).c_str(),
-                    number(row.board).c_str(), row.unit.c_str(), limit.c_str(), end.empty() ? "" : ": ",
-                    end.c_str());
+        std::string end = verdict(row);
+        if (!end.empty()) end = words(row.limit) + ": " + end;
+        const std::string unit = row.unit + (end.empty() ? "" : std::string(7 - row.unit.size(), ' '));
+        std::printf("  %-50s %10s %10s%s%s%s\n", row.measure.c_str(), number(row.bullet).c_str(),
+                    number(row.board).c_str(), unit.empty() ? "" : " ", unit.c_str(), end.c_str());
     }
 }
 
