@@ -1,0 +1,125 @@
+// bullet-client: Bullet's scenes on Bullet's own solver and on the board's, in one table.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "table.h"
+
+namespace {
+
+enum Exit { OK = 0, LIMIT = 1, USAGE = 2, SKIPPED = 77 };
+
+const char USAGE_TEXT[] =
+    "usage: bullet-client [SCENE...] [--board TEXT] [--iterations N] [--points N] [--json] [--list] "
+    "[--help]\n"
+    "\n"
+    "Runs scenes of Bullet on Bullet's own solver, which starts warm, and on the board's, and prints both.\n"
+    "Without a scene: all but `time`.\n"
+    "\n"
+    "  --board TEXT      the board, as in docs/c.md (emulated:float,world)\n"
+    "  --iterations N    passes of contact and of friction, 1 to 255, in place of each scene's own; limits "
+    "are\n"
+    "                    then shown and do not count\n"
+    "  --points N        largest number of points of a collision, 1 to 4 (4)\n"
+    "  --json            the table as JSON\n"
+    "  --list            the scenes\n"
+    "\n"
+    "exit status: 0; 1 a limit does not hold; 2 wrong usage; 77 the board does not open, nothing was run\n";
+
+int usage(const std::string &found) {
+    std::fprintf(stderr, "bullet-client: %s; --help says what is possible\n", found.c_str());
+    return USAGE;
+}
+
+bool toNumber(const char *text, int low, int high, int &number) {
+    char *end = nullptr;
+    const long value = std::strtol(text, &end, 10);
+    if (end == text || *end != '\0' || value < low || value > high) return false;
+    number = int(value);
+    return true;
+}
+
+const Scene *find(const std::string &name) {
+    for (const Scene &scene : scenes())
+        if (name == scene.name) return &scene;
+    return nullptr;
+}
+
+}  // namespace
+
+const std::vector<Scene> &scenes() {
+    static const std::vector<Scene> all = {
+        {"pile", "1,000 cubes of 1 kg fall", pile, false},
+        {"wall", "80 bricks, and a ball of 20 kg against them", wall, false},
+        {"mixed", "288 spheres, capsules, boxes and cylinders of four masses", mixed, false},
+        {"tower", "cubes of 1 kg on each other, 10 + 10 passes", tower, false},
+        {"ratio", "a cube of 100 kg on a cube of 1 kg, 10 + 10 passes", ratio, false},
+        {"ramp", "boxes on a ramp of 20 degrees, each with its friction", ramp, false},
+        {"groove", "a marble rolls in a V groove, friction 0.5", groove, false},
+        {"spin", "10 rad/s about the vertical", spin, false},
+        {"platform", "a kinematic platform", platform, false},
+        {"restitution", "a ball of restitution 0.8 falls 5 m", restitution, false},
+        {"mesh", "60 boxes and 60 spheres on a mesh of triangles", mesh, false},
+        {"sleeping", "125 cubes come to rest", sleeping, false},
+        {"ccd", "a fast ball against a thin wall", ccd, false},
+        {"joints", "a chain, which stays Bullet's, beside boxes on the board", joints, false},
+        {"masses", "more masses than the board's 64", masses, false},
+        {"time", "a step of jumbled cubes, both solvers on the same contacts, 10 + 10 passes", timing, true},
+    };
+    return all;
+}
+
+int main(int count, char **arguments) {
+    Settings settings;
+    std::vector<const Scene *> chosen;
+    bool json = false;
+    for (int i = 1; i < count; i++) {
+        const std::string argument = arguments[i];
+        const char *value = i + 1 < count ? arguments[i + 1] : nullptr;
+        if (argument == "--help") {
+            std::fputs(USAGE_TEXT, stdout);
+            return OK;
+        } else if (argument == "--list") {
+            for (const Scene &scene : scenes()) std::printf("%-12s %s\n", scene.name, scene.title);
+            return OK;
+        } else if (argument == "--json") {
+            json = true;
+        } else if (argument == "--board" || argument == "--iterations" || argument == "--points") {
+            if (!value) return usage(argument + " needs a value");
+            i++;
+            if (argument == "--board") {
+                settings.board = value;
+            } else if (argument == "--iterations") {
+                if (!toNumber(value, 1, 255, settings.iterations))
+                    return usage("expected 1 to 255 after --iterations, found " + std::string(value));
+            } else if (!toNumber(value, 1, ZPGS_CONTACT_POINTS, settings.points)) {
+                return usage("expected 1 to 4 after --points, found " + std::string(value));
+            }
+        } else if (const Scene *scene = find(argument)) {
+            chosen.push_back(scene);
+        } else {
+            return usage("no scene or option " + argument);
+        }
+    }
+    if (chosen.empty())
+        for (const Scene &scene : scenes())
+            if (!scene.onDemand) chosen.push_back(&scene);
+
+    zpgs_accelerator *board = nullptr;
+    if (zpgs_open(settings.board.c_str(), &board) != ZPGS_STATUS_OK) {
+        std::fprintf(stderr, "bullet-client: skipped, no board: %s\n", zpgs_last_error(nullptr));
+        return SKIPPED;
+    }
+    zpgs_close(board);
+
+    Table table(settings);
+    for (const Scene *scene : chosen) {
+        table.begin(scene->name);
+        scene->run(table);
+    }
+    if (json)
+        table.printJson();
+    else
+        table.print();
+    return table.failed() ? LIMIT : OK;
+}

@@ -1,0 +1,240 @@
+#include "zynq_pgs_gather.h"
+
+#include <algorithm>
+
+namespace {
+
+// Entries of the board's table of shapes.
+const size_t SHAPES = 64;
+// A collision has one normal, a manifold has one for each point. Points share a collision if their normals
+// differ by less than 2.6 degrees.
+const btScalar SAME_NORMAL = btScalar(0.999);
+const uint32_t STATIC_SHAPE = 0;
+
+void store(float *to, const btVector3 &vector) {
+    for (int i = 0; i < 3; i++) to[i] = float(vector[i]);
+}
+
+btVector3 load(const float *from) { return btVector3(from[0], from[1], from[2]); }
+
+btRigidBody *movable(btCollisionObject *object) {
+    btRigidBody *body = btRigidBody::upcast(object);
+    return body && body->getInvMass() > 0 && !body->isStaticOrKinematicObject() ? body : nullptr;
+}
+
+// The body whose velocity counts in a contact. Like Bullet, this ignores the velocity of a static body.
+const btRigidBody *moving(const btCollisionObject *object) {
+    const btRigidBody *body = btRigidBody::upcast(object);
+    return body && (body->getInvMass() > 0 || body->isKinematicObject()) ? body : nullptr;
+}
+
+// Velocities with this step's forces, as Bullet's solver has them.
+void velocitiesWithForces(const btRigidBody &body, const btContactSolverInfo &info, btVector3 &linear,
+                          btVector3 &angular) {
+    const btScalar timeStep = info.m_timeStep;
+    linear = body.getLinearVelocity() + body.getTotalForce() * (body.getInvMass() * timeStep);
+    btVector3 change = body.getInvInertiaTensorWorld() * body.getTotalTorque() * timeStep;
+    const int flags = body.getFlags();
+    if (flags & BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT) {
+        const btVector3 force = body.computeGyroscopicForceExplicit(info.m_maxGyroscopicForce);
+        change -= body.getInvInertiaTensorWorld() * force * timeStep;
+    }
+    if (flags & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD)
+        change += body.computeGyroscopicImpulseImplicit_World(timeStep);
+    if (flags & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY)
+        change += body.computeGyroscopicImpulseImplicit_Body(timeStep);
+    angular = body.getAngularVelocity() + change;
+}
+
+// The speed at which a point may close, m/s, which travels as its distance. Below 0 the bodies must part.
+// - A gap closes within the step at most, so that a point ahead of the contact does nothing too early.
+// - Penetration goes by its share (ERP) in a step, as in Bullet.
+// - A bounce takes the place of that push where it is faster. Bullet adds the two, and a ball then rises
+//   higher than its restitution says.
+float closingSpeed(const btManifoldPoint &point, const btCollisionObject *a, const btCollisionObject *b,
+                   const btContactSolverInfo &info) {
+    auto velocity = [&point](const btCollisionObject *object) {
+        const btRigidBody *body = moving(object);
+        if (!body) return btVector3(0, 0, 0);
+        const btVector3 &centre = object->getWorldTransform().getOrigin();
+        return body->getVelocityInLocalPoint(point.getPositionWorldOnB() - centre);
+    };
+    const btScalar parting = point.m_normalWorldOnB.dot(velocity(a) - velocity(b));
+    const bool bounces = parting < -info.m_restitutionVelocityThreshold;
+    const btScalar bounce = bounces ? -parting * point.m_combinedRestitution : btScalar(0);
+    const btScalar distance = point.getDistance() + info.m_linearSlop;
+    if (distance > 0) return float(distance / info.m_timeStep - bounce);
+    const bool ownErp = point.m_contactPointFlags & BT_CONTACT_FLAG_HAS_CONTACT_ERP;
+    const btScalar erp = ownErp ? point.m_contactERP : info.m_erp2;
+    return -float(btMax(-distance * erp / info.m_timeStep, bounce));
+}
+
+}  // namespace
+
+void ZynqPgsGather::clearGathered() {
+    for (const btCollisionObject *object : m_objects)
+        m_bodyOfObject[size_t(object->getWorldArrayIndex())] = -1;
+    m_objects.clear();
+    m_bodies.clear();
+    m_collisions.clear();
+    m_points.clear();
+    m_frictions.clear();
+    m_hasKinematic = false;
+}
+
+void ZynqPgsGather::clear() {
+    clearGathered();
+    m_takenBodies.clear();
+    m_takenManifolds.clear();
+}
+
+void ZynqPgsGather::clearShapes() {
+    m_shapes.clear();
+    m_shapeIndices.clear();
+    m_shapesVersion++;
+}
+
+void ZynqPgsGather::take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds,
+                         int numManifolds) {
+    m_takenBodies.insert(m_takenBodies.end(), bodies, bodies + numBodies);
+    m_takenManifolds.insert(m_takenManifolds.end(), manifolds, manifolds + numManifolds);
+}
+
+bool ZynqPgsGather::gather(const btContactSolverInfo &info) {
+    const bool fresh = m_shapes.empty();
+    m_tooManyShapes = false;
+    if (fresh) shapeOf(0, btVector3(0, 0, 0));  // STATIC_SHAPE
+    for (btPersistentManifold *manifold : m_takenManifolds) addManifold(manifold, info);
+    if (!m_tooManyShapes) return true;
+
+    // Shapes of bodies that are gone or asleep may fill the table: try once with an empty one.
+    clearShapes();
+    clearGathered();
+    return !fresh && gather(info);
+}
+
+void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactSolverInfo &info) {
+    auto *a = const_cast<btCollisionObject *>(manifold->getBody0());
+    auto *b = const_cast<btCollisionObject *>(manifold->getBody1());
+    if (!a->hasContactResponse() || !b->hasContactResponse() || (!movable(a) && !movable(b))) return;
+    const int count = manifold->getNumContacts();
+    if (count == 0) return;
+
+    // The nearest point of the first one follows it. So two points that share a collision lie at one edge of
+    // a face, and the friction of the two collisions acts at opposite edges.
+    int order[MANIFOLD_CACHE_SIZE];
+    for (int i = 0; i < count; i++) order[i] = i;
+    if (m_pointsPerCollision == 2 && count > 2) {
+        auto away = [manifold](int i) {
+            const btVector3 &origin = manifold->getContactPoint(0).getPositionWorldOnB();
+            return manifold->getContactPoint(i).getPositionWorldOnB().distance2(origin);
+        };
+        std::swap(order[1], *std::min_element(order + 1, order + count,
+                                              [&away](int i, int j) { return away(i) < away(j); }));
+    }
+
+    const size_t first = m_collisions.size();
+    for (int i = 0; i < count; i++) {
+        btManifoldPoint &point = manifold->getContactPoint(order[i]);
+        const size_t at = collisionOf(manifold, point, first, info);
+        zpgs_collision &collision = m_collisions[at];
+        zpgs_contact &contact = collision.contacts[collision.count];
+        store(contact.point, point.getPositionWorldOnB());
+        contact.distance = closingSpeed(point, a, b, info);
+        m_points[at][collision.count] = &point;
+        collision.count++;
+    }
+}
+
+// The collision of this manifold that takes the point: one of those from `first` on, or a new one.
+size_t ZynqPgsGather::collisionOf(btPersistentManifold *manifold, const btManifoldPoint &point, size_t first,
+                                  const btContactSolverInfo &info) {
+    const int points = std::max(1, std::min(m_pointsPerCollision, ZPGS_CONTACT_POINTS));
+    const uint32_t room = uint32_t(points);
+    const float friction = float(btMax(point.m_combinedFriction, btScalar(0)));
+    for (size_t at = first; at < m_collisions.size(); at++) {
+        const zpgs_collision &collision = m_collisions[at];
+        if (collision.count < room && m_frictions[at] == friction &&
+            load(collision.normal).dot(point.m_normalWorldOnB) > SAME_NORMAL)
+            return at;
+    }
+    zpgs_collision collision = {};
+    collision.body_a = bodyOf(const_cast<btCollisionObject *>(manifold->getBody0()), info);
+    collision.body_b = bodyOf(const_cast<btCollisionObject *>(manifold->getBody1()), info);
+    store(collision.normal, point.m_normalWorldOnB);
+    m_collisions.push_back(collision);
+    m_points.push_back(Points());
+    m_frictions.push_back(friction);
+    return m_collisions.size() - 1;
+}
+
+uint32_t ZynqPgsGather::bodyOf(btCollisionObject *object, const btContactSolverInfo &info) {
+    // Bullet's companion id would do, but its own solver leaves old ones behind.
+    const size_t place = size_t(object->getWorldArrayIndex());
+    if (place >= m_bodyOfObject.size()) m_bodyOfObject.resize(place + 1, -1);
+    if (m_bodyOfObject[place] >= 0) return uint32_t(m_bodyOfObject[place]);
+    m_bodyOfObject[place] = int(m_bodies.size());
+
+    Body body = {};
+    store(body.position, object->getWorldTransform().getOrigin());
+    body.orientation[3] = 1.0f;
+    body.shape = STATIC_SHAPE;
+    if (const btRigidBody *rigid = movable(object)) {
+        btVector3 linear, angular;
+        velocitiesWithForces(*rigid, info, linear, angular);
+        store(body.linearVelocity, linear);
+        store(body.angularVelocity, angular);
+        btVector3 inverseInertia = rigid->getInvInertiaDiagLocal();
+        if (rigid->getAngularFactor().isZero()) inverseInertia.setZero();
+        body.shape = shapeOf(rigid->getInvMass(), inverseInertia);
+        // Without integration the orientation only turns the inertia, and a sphere's needs no turn.
+        if (inverseInertia[0] != inverseInertia[1] || inverseInertia[0] != inverseInertia[2]) {
+            const btQuaternion turn = object->getWorldTransform().getRotation();
+            for (int i = 0; i < 4; i++) body.orientation[i] = float(turn[i]);
+        }
+    } else if (const btRigidBody *carried = moving(object)) {
+        store(body.linearVelocity, carried->getLinearVelocity());
+        store(body.angularVelocity, carried->getAngularVelocity());
+        m_hasKinematic |= !carried->getLinearVelocity().isZero() || !carried->getAngularVelocity().isZero();
+    }
+    m_bodies.push_back(body);
+    m_objects.push_back(object);
+    return uint32_t(m_bodies.size() - 1);
+}
+
+uint32_t ZynqPgsGather::shapeOf(btScalar inverseMass, const btVector3 &inverseInertia) {
+    zpgs_shape shape = {float(inverseMass), {}};
+    store(shape.inverse_inertia, inverseInertia);
+    const std::array<float, 4> key = {shape.inverse_mass, shape.inverse_inertia[0], shape.inverse_inertia[1],
+                                      shape.inverse_inertia[2]};
+    const auto found = m_shapeIndices.find(key);
+    if (found != m_shapeIndices.end()) return found->second;
+    if (m_shapes.size() == SHAPES) {
+        m_tooManyShapes = true;
+        return STATIC_SHAPE;
+    }
+    m_shapes.push_back(shape);
+    m_shapesVersion++;
+    return m_shapeIndices[key] = uint32_t(m_shapes.size() - 1);
+}
+
+void ZynqPgsGather::writeVelocities(const btContactSolverInfo &info) {
+    auto write = [](btRigidBody *body, const btVector3 &linear, const btVector3 &angular) {
+        // The board knows no locked axes.
+        body->setLinearVelocity(linear * body->getLinearFactor());
+        body->setAngularVelocity(angular * body->getAngularFactor());
+    };
+    for (size_t i = 0; i < m_bodies.size(); i++)
+        if (btRigidBody *body = movable(m_objects[i]))
+            write(body, load(m_bodies[i].linearVelocity), load(m_bodies[i].angularVelocity));
+    for (btCollisionObject *object : m_takenBodies) {
+        const size_t place = size_t(object->getWorldArrayIndex());
+        if (place < m_bodyOfObject.size() && m_bodyOfObject[place] >= 0) continue;
+        btRigidBody *body = movable(object);
+        if (!body) continue;
+        // A body in no collision has only its forces.
+        btVector3 linear, angular;
+        velocitiesWithForces(*body, info, linear, angular);
+        write(body, linear, angular);
+    }
+}

@@ -1,0 +1,76 @@
+// Bullet's islands as the bodies and collisions of one step of the board. ZynqPgsSolver uses it.
+#pragma once
+
+#include <btBulletDynamicsCommon.h>
+#include <zynq_pgs.h>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+class ZynqPgsGather {
+public:
+    // A body as the board takes it.
+    struct Body {
+        float position[3], orientation[4];
+        float linearVelocity[3], angularVelocity[3];
+        uint32_t shape;
+    };
+    // Bullet's points of a collision: element i is that of contact i; the rest is null.
+    using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
+
+    explicit ZynqPgsGather(int pointsPerCollision) : m_pointsPerCollision(pointsPerCollision) {}
+
+    // Forgets the step, but not the shapes.
+    void clear();
+    // Takes an island, or some.
+    void take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds, int numManifolds);
+    // Makes collisions and bodies of everything taken. False if the masses and inertias do not fit into the
+    // board's table.
+    bool gather(const btContactSolverInfo &info);
+    // Gives every body taken its velocity: that in bodies(), or by its forces if it is in no collision.
+    void writeVelocities(const btContactSolverInfo &info);
+
+    // The bodies and manifolds taken.
+    std::vector<btCollisionObject *> &takenBodies() { return m_takenBodies; }
+    std::vector<btPersistentManifold *> &takenManifolds() { return m_takenManifolds; }
+
+    // What goes to the board. A body that no collision names does not.
+    std::vector<Body> &bodies() { return m_bodies; }
+    std::vector<zpgs_collision> &collisions() { return m_collisions; }
+    const std::vector<Points> &points() const { return m_points; }       // parallel to collisions()
+    const std::vector<float> &frictions() const { return m_frictions; }  // parallel to collisions()
+    // True if a kinematic body in a collision moves.
+    bool hasKinematic() const { return m_hasKinematic; }
+    const std::vector<zpgs_shape> &shapes() const { return m_shapes; }
+    // Another number for another table of shapes.
+    uint64_t shapesVersion() const { return m_shapesVersion; }
+
+private:
+    void addManifold(btPersistentManifold *manifold, const btContactSolverInfo &info);
+    size_t collisionOf(btPersistentManifold *manifold, const btManifoldPoint &point, size_t first,
+                       const btContactSolverInfo &info);
+    uint32_t bodyOf(btCollisionObject *object, const btContactSolverInfo &info);
+    uint32_t shapeOf(btScalar inverseMass, const btVector3 &inverseInertia);
+    void clearGathered();
+    void clearShapes();
+
+    const int m_pointsPerCollision;
+    std::vector<btCollisionObject *> m_takenBodies;
+    std::vector<btPersistentManifold *> m_takenManifolds;
+
+    std::vector<Body> m_bodies;
+    std::vector<btCollisionObject *> m_objects;  // parallel to m_bodies
+    std::vector<int> m_bodyOfObject;             // by the object's index in its world; -1 is none
+    std::vector<zpgs_collision> m_collisions;
+    std::vector<Points> m_points;
+    std::vector<float> m_frictions;
+    bool m_hasKinematic = false;
+
+    // The table stays from step to step, so that the board seldom gets a new one.
+    std::vector<zpgs_shape> m_shapes;
+    std::map<std::array<float, 4>, uint32_t> m_shapeIndices;
+    uint64_t m_shapesVersion = 0;
+    bool m_tooManyShapes = false;
+};

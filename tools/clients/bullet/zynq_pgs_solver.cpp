@@ -1,0 +1,207 @@
+#include "zynq_pgs_solver.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+
+namespace {
+
+int islandOf(const btCollisionObject *a, const btCollisionObject *b) {
+    return a->getIslandTag() >= 0 ? a->getIslandTag() : b->getIslandTag();
+}
+
+// A field of all bodies.
+zpgs_strided column(float *field) { return {field, sizeof(ZynqPgsGather::Body)}; }
+
+}  // namespace
+
+ZynqPgsSolver::ZynqPgsSolver(const char *board, const ZynqPgsOptions &options)
+    : m_boardText(board), m_options(options), m_gather(options.pointsPerCollision) {
+    open();
+}
+
+ZynqPgsSolver::~ZynqPgsSolver() { zpgs_close(m_board); }
+
+bool ZynqPgsSolver::open() {
+    m_hasShapes = false;
+    return !failed(zpgs_open(m_boardText.c_str(), &m_board));
+}
+
+void ZynqPgsSolver::prepareSolve(int bodies, int manifolds) {
+    btSequentialImpulseConstraintSolver::prepareSolve(bodies, manifolds);
+    m_gather.clear();
+}
+
+// Bullet calls this for each island, or for several at once, and allSolved after the last one.
+btScalar ZynqPgsSolver::solveGroup(btCollisionObject **bodies, int numBodies,
+                                   btPersistentManifold **manifolds, int numManifolds,
+                                   btTypedConstraint **constraints, int numConstraints,
+                                   const btContactSolverInfo &info, btIDebugDraw *debugDrawer,
+                                   btDispatcher *dispatcher) {
+    m_dispatcher = dispatcher;
+    if (numConstraints == 0) {
+        m_gather.take(bodies, numBodies, manifolds, numManifolds);
+        return 0;
+    }
+    // A group may hold islands with joints and islands without; only the former are Bullet's.
+    std::vector<int> jointed;
+    for (int i = 0; i < numConstraints; i++)
+        jointed.push_back(islandOf(&constraints[i]->getRigidBodyA(), &constraints[i]->getRigidBodyB()));
+    std::sort(jointed.begin(), jointed.end());
+    auto hasJoint = [&jointed](int island) {
+        return std::binary_search(jointed.begin(), jointed.end(), island);
+    };
+    std::vector<btCollisionObject *> ownBodies;
+    std::vector<btPersistentManifold *> ownManifolds;
+    for (int i = 0; i < numBodies; i++)
+        (hasJoint(bodies[i]->getIslandTag()) ? ownBodies : m_gather.takenBodies()).push_back(bodies[i]);
+    for (int i = 0; i < numManifolds; i++) {
+        const int island = islandOf(manifolds[i]->getBody0(), manifolds[i]->getBody1());
+        (hasJoint(island) ? ownManifolds : m_gather.takenManifolds()).push_back(manifolds[i]);
+    }
+    m_counts.jointGroups++;
+    return btSequentialImpulseConstraintSolver::solveGroup(
+        ownBodies.data(), int(ownBodies.size()), ownManifolds.data(), int(ownManifolds.size()), constraints,
+        numConstraints, info, debugDrawer, dispatcher);
+}
+
+void ZynqPgsSolver::allSolved(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {
+    if (m_gather.takenBodies().empty()) return;
+    const bool fits = m_gather.gather(info);
+    if (!fits) say("the step has more than 64 different masses and inertias: Bullet's own solver takes it");
+    if (fits && (m_gather.collisions().empty() || stepBoard(info)))
+        m_gather.writeVelocities(info);
+    else
+        fallBack(info, debugDrawer);
+    m_gather.clear();
+}
+
+bool ZynqPgsSolver::loadShapes() {
+    if (m_hasShapes && m_shapesVersion == m_gather.shapesVersion()) return true;
+    const std::vector<zpgs_shape> &shapes = m_gather.shapes();
+    m_hasShapes = !failed(zpgs_set_shapes(m_board, shapes.data(), shapes.size()));
+    m_shapesVersion = m_gather.shapesVersion();
+    return m_hasShapes;
+}
+
+void ZynqPgsSolver::setParameters(const btContactSolverInfo &info, zpgs_parameters &parameters) const {
+    const int world = info.m_numIterations;
+    const int contact = m_options.contactIterations > 0 ? m_options.contactIterations : world;
+    const int friction = m_options.frictionIterations > 0 ? m_options.frictionIterations : world;
+    parameters.contact_iterations = uint32_t(contact);
+    parameters.friction_iterations = uint32_t(friction);
+    parameters.integrate = 0;
+    parameters.time_step = float(info.m_timeStep);
+    // With these two a point's distance is the speed at which it may close: closingSpeed of the gather.
+    parameters.position_drift = 0.0f;
+    parameters.position_coefficient = parameters.time_step;
+    // Bullet has no such damping; it would brake every body that rolls or spins.
+    parameters.spin_damping = 0.0f;
+    parameters.order = m_options.order;
+    parameters.retries = m_options.retries;
+    // Not every bitstream has the next two, so a step asks for them only where it needs them.
+    parameters.kinematic = m_gather.hasKinematic();
+    const std::vector<float> &frictions = m_gather.frictions();
+    parameters.friction = frictions[0];
+    for (const float other : frictions)
+        if (other != frictions[0]) parameters.pair_friction = 1;
+}
+
+// False if the board did not solve the step. The bodies and Bullet's points are then as before.
+bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
+    if (m_reopen) {
+        m_reopen = false;
+        open();
+    }
+    if (!m_board || !loadShapes()) return false;
+
+    zpgs_parameters parameters;
+    if (failed(zpgs_parameters_default(&parameters, sizeof parameters))) return false;
+    setParameters(info, parameters);
+
+    std::vector<ZynqPgsGather::Body> &all = m_gather.bodies();
+    ZynqPgsGather::Body &first = all[0];
+    zpgs_bodies bodies = {};
+    bodies.size = sizeof bodies;
+    bodies.count = all.size();
+    bodies.positions = column(first.position);
+    bodies.orientations = column(first.orientation);
+    bodies.linear_velocities = column(first.linearVelocity);
+    bodies.angular_velocities = column(first.angularVelocity);
+    bodies.shapes = {&first.shape, sizeof first};
+
+    std::vector<zpgs_collision> &pairs = m_gather.collisions();
+    size_t points = 0;
+    for (size_t i = 0; i < pairs.size(); i++) {
+        points += pairs[i].count;
+        if (parameters.pair_friction)
+            pairs[i].count = zpgs_count_with_friction(pairs[i].count, m_gather.frictions()[i]);
+    }
+    zpgs_collisions collisions = {};
+    collisions.size = sizeof collisions;
+    collisions.count = pairs.size();
+    collisions.collisions = {pairs.data(), sizeof pairs[0]};
+
+    zpgs_report report = {};
+    report.size = sizeof report;
+    const std::clock_t start = std::clock();
+    const zpgs_status status = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
+    if (failed(status)) return false;
+    m_counts.boardSteps++;
+    m_counts.bodies = all.size();
+    m_counts.collisions = pairs.size();
+    m_counts.points = points;
+    m_counts.report = report;
+    exchangeImpulses();
+    return true;
+}
+
+// ==== The place for a warm start ====
+// The interface has no impulses yet: every step starts from 0, and Bullet must not find old ones when it
+// takes over an island. When a step takes and returns impulses, in an array parallel to the collisions:
+// - before zpgs_step, normal impulse i of collision k is points()[k][i]->m_appliedImpulse times
+//   info.m_warmstartingFactor, or 0 without SOLVER_USE_WARMSTARTING. The two tangential impulses of
+//   collision k are m_appliedImpulseLateral1 and m_appliedImpulseLateral2 of points()[k][0];
+// - after it, here, the same fields take what comes back. Bullet keeps them for a point that persists. Its
+//   own solver has other tangents than the board, so the tangential ones become 0 where the solver changes.
+// ====
+void ZynqPgsSolver::exchangeImpulses() {
+    for (const ZynqPgsGather::Points &points : m_gather.points())
+        for (btManifoldPoint *point : points) {
+            if (!point) break;
+            point->m_appliedImpulse = 0;
+            point->m_appliedImpulseLateral1 = 0;
+            point->m_appliedImpulseLateral2 = 0;
+        }
+}
+
+void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {
+    m_counts.fallbackSteps++;
+    std::vector<btCollisionObject *> &bodies = m_gather.takenBodies();
+    std::vector<btPersistentManifold *> &manifolds = m_gather.takenManifolds();
+    btSequentialImpulseConstraintSolver::solveGroup(bodies.data(), int(bodies.size()), manifolds.data(),
+                                                    int(manifolds.size()), nullptr, 0, info, debugDrawer,
+                                                    m_dispatcher);
+}
+
+// Also where no board is open: the error is then the thread's.
+bool ZynqPgsSolver::failed(zpgs_status status) {
+    if (status == ZPGS_STATUS_OK) return false;
+    const std::string own = m_board ? zpgs_last_error(m_board) : "";
+    say(own.empty() ? zpgs_last_error(nullptr) : own);
+    if (status == ZPGS_STATUS_REOPEN || status == ZPGS_STATUS_PANIC) {
+        zpgs_close(m_board);
+        m_board = nullptr;
+        m_reopen = true;  // by the next step, once
+    }
+    return true;
+}
+
+// Keeps every error, and prints the first one: a program that never asks would not notice.
+void ZynqPgsSolver::say(const std::string &error) {
+    m_lastError = error;
+    if (m_saidError) return;
+    m_saidError = true;
+    std::fprintf(stderr, "zynq-pgs: %s\n", error.c_str());
+}

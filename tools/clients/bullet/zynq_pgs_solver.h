@@ -1,0 +1,90 @@
+// A constraint solver for Bullet that solves contacts on an accelerator, by the C interface of zynq-pgs.
+//
+//     ZynqPgsSolver solver("emulated:float,world");
+//     btDiscreteDynamicsWorld world(&dispatcher, &broadphase, &solver, &configuration);
+//
+// The solver gathers the islands of a step and solves them all in one step of the board. Forces, gyroscopic
+// terms, continuous detection, sleeping and the integration stay Bullet's. An island with a joint goes to
+// Bullet's own solver, from which this class derives, and so does a whole step that the board cannot take.
+#pragma once
+
+#include <btBulletDynamicsCommon.h>
+#include <zynq_pgs.h>
+
+#include <cstdint>
+#include <string>
+
+#include "zynq_pgs_gather.h"
+
+struct ZynqPgsOptions {
+    // Passes; 0 takes m_numIterations of the world.
+    int contactIterations = 0;
+    int frictionIterations = 0;
+    // Largest number of points of a collision, 1 to 4. The board applies the friction of a collision at the
+    // centre of its points. One place cannot resist a twist about the normal, two places can. With 2 a face
+    // that rests on four points has two places; the step then has up to twice as many collisions.
+    int pointsPerCollision = 4;
+    // One of zpgs_order.
+    uint32_t order = ZPGS_ORDER_AUTOMATIC;
+    // Repetitions of a step that failed on the board, before Bullet's solver takes it.
+    uint32_t retries = 1;
+};
+
+struct ZynqPgsCounts {
+    // Steps that the board solved, and steps that Bullet's solver took over from it.
+    uint64_t boardSteps = 0;
+    uint64_t fallbackSteps = 0;
+    // Groups of islands with joints, which are Bullet's without a fault.
+    uint64_t jointGroups = 0;
+    // Of the last step on the board.
+    size_t bodies = 0;
+    size_t collisions = 0;
+    size_t points = 0;
+    zpgs_report report = {};
+    // Processor time in the library, s: the packing and the waiting, or the emulation. Over all steps.
+    double librarySeconds = 0.0;
+};
+
+class ZynqPgsSolver : public btSequentialImpulseConstraintSolver {
+public:
+    // Opens the board. If this fails, isOpen() is false, and every step is Bullet's.
+    explicit ZynqPgsSolver(const char *board, const ZynqPgsOptions &options = ZynqPgsOptions());
+    ~ZynqPgsSolver() override;
+    ZynqPgsSolver(const ZynqPgsSolver &) = delete;
+    ZynqPgsSolver &operator=(const ZynqPgsSolver &) = delete;
+
+    bool isOpen() const { return m_board != nullptr; }
+    // Why the board did not open, or why the last step on it failed. Empty if neither happened.
+    const std::string &lastError() const { return m_lastError; }
+    const ZynqPgsCounts &counts() const { return m_counts; }
+
+    void prepareSolve(int bodies, int manifolds) override;
+    btScalar solveGroup(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds,
+                        int numManifolds, btTypedConstraint **constraints, int numConstraints,
+                        const btContactSolverInfo &info, btIDebugDraw *debugDrawer,
+                        btDispatcher *dispatcher) override;
+    void allSolved(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) override;
+
+private:
+    bool open();
+    bool loadShapes();
+    void setParameters(const btContactSolverInfo &info, zpgs_parameters &parameters) const;
+    bool stepBoard(const btContactSolverInfo &info);
+    void exchangeImpulses();
+    void fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer);
+    bool failed(zpgs_status status);
+    void say(const std::string &error);
+
+    const std::string m_boardText;
+    const ZynqPgsOptions m_options;
+    zpgs_accelerator *m_board = nullptr;
+    bool m_reopen = false;
+    ZynqPgsGather m_gather;
+    // The shapes that the board has.
+    bool m_hasShapes = false;
+    uint64_t m_shapesVersion = 0;
+    btDispatcher *m_dispatcher = nullptr;
+    ZynqPgsCounts m_counts;
+    std::string m_lastError;
+    bool m_saidError = false;
+};
