@@ -107,7 +107,8 @@ pub use platform::{
 };
 pub use scene::{
     Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    Impulses, Pose, Shape, ShapeError, StepParameters, Structures, Velocity, WarmCollisions,
+    ContactMemory, Impulses, Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
+    WarmCollisions,
 };
 pub use step::{
     Accelerator, Detached, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles,

@@ -154,7 +154,8 @@ impl Plan {
             .map(|channel| {
                 let segments = self.segments(channel);
                 let others = self.rounds() - self.warm_rounds(&segments);
-                let Segments { velocities, poses, collisions, warm_contact, warm_friction } = segments;
+                let Segments { velocities, poses, collisions, warm_contact, warm_friction } =
+                    segments;
                 let warm = [warm_contact, warm_friction].into_iter().flatten();
                 bytes(velocities.len() + poses.len())
                     .saturating_add(bytes(collisions.len()).saturating_mul(others))
@@ -199,8 +200,12 @@ mod tests {
     use crate::platform::fake::FakeRegisters;
     use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
 
-    const FOUR: Plan =
-        Plan { bodies: 38_881, collisions: 127_746, passes: PASSES, variant: FLOAT.default_variant() };
+    const FOUR: Plan = Plan {
+        bodies: 38_881,
+        collisions: 127_746,
+        passes: PASSES,
+        variant: FLOAT.default_variant(),
+    };
     const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
     #[test]
@@ -221,6 +226,33 @@ mod tests {
         assert_eq!(beats(|s| &s.poses), 2 * 38_881);
         assert_eq!(FOUR.bytes_to_device(), 16 * (4 * 38_881 + 8 * 7 * 127_746));
         assert_eq!(FOUR.bytes_from_device(), 16 * 4 * 38_881);
+    }
+
+    /// Channel 3 of `float` has one beat of a collision, and in a warm pass two.
+    #[test]
+    fn impulses_have_a_segment_of_their_own_on_one_channel() {
+        let passes = Passes { contact: 5, friction: 5, warm: true, impulses_out: true };
+        let warm = Plan { passes, ..FOUR };
+        let (bodies, collisions) = (38_881, 127_746);
+        for channel in 0..3 {
+            let segments = warm.segments(channel);
+            assert_eq!((&segments.warm_contact, &segments.warm_friction), (&None, &None));
+            assert_eq!(segments.of_pass(0, passes), &segments.collisions);
+        }
+        let segments = warm.segments(3);
+        let lengths = [0, 1, 4, 5, 6, 9].map(|pass| segments.of_pass(pass, passes).len());
+        let [one, two] = [collisions, 2 * collisions];
+        assert_eq!(lengths, [two, one, one, two, one, one]);
+        let friction = segments.warm_friction.clone().expect("a segment");
+        assert!(friction.start >= segments.warm_contact.clone().expect("a segment").end);
+        assert_eq!(segments.end(), friction.end);
+        assert_eq!(warm.bytes_to_device(), 16 * (4 * bodies + (8 * 7 + 2 * 8) * collisions as u64));
+        assert_eq!(warm.bytes_from_device(), 16 * (4 * bodies + 2 * collisions as u64));
+        assert_eq!((warm.impulses(0), warm.impulses(3)), (2 * collisions, 0));
+        assert!((0..4).all(|channel| warm.descriptors(channel, 67_108_800) == 12));
+        let contact_alone = Passes { friction: 0, ..passes };
+        let plan = Plan { passes: contact_alone, ..FOUR };
+        assert_eq!((plan.impulses(0), plan.segments(3).warm_friction), (collisions, None));
     }
 
     #[test]

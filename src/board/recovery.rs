@@ -18,7 +18,9 @@ impl Device {
         log::debug!("step failed: {fault}");
         let aftermath = match &fault {
             // The board has completed the step, or was not started.
-            Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. } | Fault::NoMemory(_) => Aftermath::Untouched,
+            Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. } | Fault::NoMemory(_) => {
+                Aftermath::Untouched
+            }
             Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
             // No write to another bitstream: its registers may mean anything.
             Fault::OtherBitstream { .. } => self.give_up(&fault),

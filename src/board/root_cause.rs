@@ -17,7 +17,9 @@ impl Device {
     /// part in it.
     pub(crate) fn diagnose(&mut self, symptom: Symptom) -> (Fault, Option<Box<Diagnosis>>) {
         use Fault::{Cancelled, ImpulseNotFinite, NoMemory, NotFinite};
-        if let Symptom::Known(fault @ (NotFinite { .. } | ImpulseNotFinite { .. } | NoMemory(_))) = symptom {
+        if let Symptom::Known(fault @ (NotFinite { .. } | ImpulseNotFinite { .. } | NoMemory(_))) =
+            symptom
+        {
             return (fault, None);
         }
         if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {

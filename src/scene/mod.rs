@@ -2,17 +2,21 @@
 
 mod body;
 mod collision;
+mod contact_memory;
 mod impulses;
 mod order;
 mod parameters;
+mod passes;
 mod shape;
 mod structures;
+mod tangents;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
+pub use contact_memory::ContactMemory;
 pub use impulses::{Impulses, WarmCollisions};
 pub use order::{Order, Ties};
-pub(crate) use parameters::Passes;
 pub use parameters::StepParameters;
+pub(crate) use passes::Passes;
 pub use shape::{Shape, ShapeError};
 pub use structures::Structures;

@@ -179,53 +179,6 @@ pub struct StepParameters {
     pub retries: u32,
 }
 
-/// The passes of a step over its collisions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Passes {
-    /// Contact passes, with the warm one.
-    pub(crate) contact: u32,
-    /// Friction passes, with the warm one.
-    pub(crate) friction: u32,
-    /// Whether the first pass of each kind brings the impulses to begin with.
-    pub(crate) warm: bool,
-    /// Whether the impulses go out.
-    pub(crate) impulses_out: bool,
-}
-
-impl Passes {
-    /// The number of passes of both kinds.
-    pub(crate) const fn total(self) -> u64 {
-        self.contact as u64 + self.friction as u64
-    }
-
-    /// Whether a pass, counted over both kinds from 0, brings impulses.
-    pub(crate) const fn is_warm(self, pass: u64) -> bool {
-        self.warm && (pass == 0 || pass == self.contact as u64)
-    }
-
-    /// The number of kinds whose impulses go out.
-    pub(crate) const fn kinds_out(self) -> usize {
-        match self.impulses_out {
-            true => (self.contact > 0) as usize + (self.friction > 0) as usize,
-            false => 0,
-        }
-    }
-}
-
-impl StepParameters {
-    /// Passes over the collisions.
-    pub(crate) fn passes(&self) -> Passes {
-        let Self { warm_start: warm, impulses_out, .. } = *self;
-        let of = |iterations: u32| iterations.saturating_add(u32::from(warm && iterations > 0));
-        Passes {
-            contact: of(self.contact_iterations),
-            friction: of(self.friction_iterations),
-            warm,
-            impulses_out,
-        }
-    }
-}
-
 impl Default for StepParameters {
     fn default() -> Self {
         Self {
@@ -387,6 +340,8 @@ mod tests {
             .with_pair_friction(true)
             .with_spin_damping(0.0)
             .with_kinematic(true)
+            .with_warm_start(true)
+            .with_impulses_out(true)
             .with_angular_damping(0.5)
             .with_gravity([1.0, 2.0, 3.0])
             .with_contact_iterations(5)
@@ -405,6 +360,8 @@ mod tests {
             angular_damping: 0.5,
             spin_damping: 0.0,
             kinematic: true,
+            warm_start: true,
+            impulses_out: true,
             gravity: [1.0, 2.0, 3.0],
             contact_iterations: 5,
             friction_iterations: 6,

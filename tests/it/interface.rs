@@ -1,7 +1,7 @@
 //! The contract's literal values: offsets, bits, layouts and reset values, typed here a second time
 //! from PG021 and the accelerator's specification.
 
-use zynq_pgs::interface::{address_map, axi_dma, control, descriptor, profile, record};
+use zynq_pgs::interface::{address_map, axi_dma, control, descriptor, profile, record, stripe};
 
 #[test]
 fn regions_stand_where_the_block_design_puts_them() {
@@ -183,6 +183,8 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::flags::INTEGRATE.mask(), 1);
     assert_eq!(control::flags::KINEMATIC.mask(), 1 << 1);
     assert_eq!(control::flags::PAIR_FRICTION.mask(), 1 << 2);
+    assert_eq!(control::flags::WARM_START.mask(), 1 << 3);
+    assert_eq!(control::flags::IMPULSES_OUT.mask(), 1 << 4);
     assert_eq!(control::features::CHECKSUMS.mask(), 1 << 0);
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
@@ -191,6 +193,7 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::features::SPIN_DAMPING.mask(), 1 << 5);
     assert_eq!(control::features::KINEMATIC.mask(), 1 << 6);
     assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
+    assert_eq!(control::features::WARM_START.mask(), 1 << 8);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,
@@ -269,6 +272,8 @@ fn records_have_the_layout_of_the_record_table() {
     assert_eq!(record::collision::NORMAL, 0);
     assert_eq!((record::collision::BODY_A, record::collision::BODY_B), (1, 2));
     assert_eq!(record::collision::CONTACTS, 3);
+    assert_eq!((record::collision::WARM_ROWS, record::collision::IMPULSES), (8, 7));
+    assert_eq!(stripe::IMPULSES_STREAM, 0);
     assert_eq!(record::pose::ROWS, 2);
     assert_eq!((record::pose::POSITION, record::pose::ORIENTATION), (0, 1));
     assert_eq!(record::result::ROWS, 4);

@@ -209,11 +209,7 @@ fn a_collision_without_impulses_begins_with_none() {
     assert_eq!(zero(bits(&found)), zero(bits(&expected)));
 }
 
-fn refused(
-    config: BoardConfig,
-    impulses: &[Impulses],
-    parameters: &StepParameters,
-) -> InputError {
+fn refused(config: BoardConfig, impulses: &[Impulses], parameters: &StepParameters) -> InputError {
     let (bodies, collisions) = scene(5);
     let (_board, mut accelerator) = open_with(config, None, &shapes());
     let mut found = bodies.clone();
@@ -235,12 +231,12 @@ fn impulses_that_are_no_numbers_or_of_another_number_are_refused() {
     let few = vec![Impulses::ZERO; count - 1];
     let found = refused(config, &few, &parameters);
     assert!(matches!(found, InputError::UnequalLengths { what: "collisions" }), "{found}");
-    for set in [
-        (|of: &mut Impulses| of.normal[0] = f32::NAN) as fn(&mut Impulses),
-        |of| of.friction[1] = f32::INFINITY,
-    ] {
+    let (mut normal, mut friction) = (Impulses::ZERO, Impulses::ZERO);
+    normal.normal[0] = f32::NAN;
+    friction.friction[1] = f32::INFINITY;
+    for wrong in [normal, friction] {
         let mut impulses = vec![Impulses::ZERO; count];
-        set(&mut impulses[17]);
+        impulses[17] = wrong;
         let found = refused(config, &impulses, &parameters);
         assert_eq!(found, InputError::ImpulseNotFinite { collision: 17 });
     }

@@ -271,7 +271,7 @@ impl Accelerator {
                 Phase::Load(segment) => self.load(segment, inputs, memory, deferral.as_deref_mut()),
                 Phase::Pass { number, segment } => {
                     let deferral = deferral.as_deref_mut();
-                    self.pass(number, segment, left, inputs, outputs, memory, deferral)
+                    self.pass(number, segment, left, (inputs, outputs), memory, deferral)
                 }
                 Phase::Integrate { poses, results } => {
                     let deferral = deferral.as_deref_mut();

@@ -163,8 +163,7 @@ impl Accelerator {
         number: u32,
         mut segment: Segment,
         limit: u64,
-        inputs: &mut [Stream],
-        outputs: &mut [Stream],
+        (inputs, outputs): (&mut [Stream], &mut [Stream]),
         memory: &Memory,
         mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
@@ -194,7 +193,8 @@ impl Accelerator {
         let cycles = match deferred {
             Some(cycles) => cycles,
             None => {
-                let input = PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
+                let input =
+                    PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
                 self.solve_arrived(input)?
             }
         };

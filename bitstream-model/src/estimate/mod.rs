@@ -13,6 +13,7 @@ mod schedule;
 pub mod thesis;
 mod time;
 mod traffic;
+mod warm;
 mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
@@ -22,4 +23,5 @@ pub use resources::{ArrayUse, MemoryUse};
 pub use schedule::{Access, AccessKind, Schedule, Slot};
 pub use time::{PartLimit, PartTime, StepTime};
 pub use traffic::{HP_PORT_BITS, HP_PORTS, Records, StepTraffic, StreamDemand, Transfer};
+pub use warm::{WarmCost, WarmStart};
 pub use window::{WindowCycles, WindowLogic, WindowStep};

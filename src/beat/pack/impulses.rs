@@ -6,8 +6,8 @@
 use pgs_interface::record::{Beat, collision};
 
 use crate::beat::stripe::Layout;
-use crate::record::{self, Counted};
 use crate::record::body_table::{Ends, Lookup as _};
+use crate::record::{self, Counted};
 use crate::scene::{Collisions, Impulses};
 
 /// The segments of both warm passes on the channel that carries impulses. A kind without iterations
@@ -44,7 +44,8 @@ pub(crate) fn pack_warm<C: Collisions + ?Sized>(
     let rows: Vec<usize> = layout.rows_on(channel).filter(|row| *row < collision::ROWS).collect();
     let WarmSegments { contact, friction } = segments;
     let beats = rows.len() + 1;
-    let (mut contact, mut friction) = (contact.chunks_exact_mut(beats), friction.chunks_exact_mut(beats));
+    let (mut contact, mut friction) =
+        (contact.chunks_exact_mut(beats), friction.chunks_exact_mut(beats));
     for index in 0..count {
         let of = collisions.collision(index);
         let impulses = collisions.impulses(index).used(&of);

@@ -246,7 +246,8 @@ fn warm_steps(parameters: &StepParameters) -> [zynq_pgs::Impulses; 2] {
         shape: body.shape,
     });
     let Collision { body_a, body_b, normal, count, contacts } = collision();
-    let contacts = contacts.map(|Contact { point, distance }| zynq_pgs::Contact { point, distance });
+    let contacts =
+        contacts.map(|Contact { point, distance }| zynq_pgs::Contact { point, distance });
     let collisions = [zynq_pgs::Collision { body_a, body_b, normal, count, contacts }];
     let mut impulses = zynq_pgs::Impulses::ZERO;
     [(); 2].map(|()| {

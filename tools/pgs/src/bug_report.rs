@@ -89,6 +89,8 @@ fn parameters_json(parameters: &StepParameters) -> Value {
         "spin_damping": parameters.spin_damping,
         "kinematic": parameters.kinematic,
         "pair_friction": parameters.pair_friction,
+        "warm_start": parameters.warm_start,
+        "impulses_out": parameters.impulses_out,
         "gravity_m_s2": parameters.gravity,
         "contact_iterations": parameters.contact_iterations,
         "friction_iterations": parameters.friction_iterations,

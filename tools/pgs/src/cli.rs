@@ -91,7 +91,9 @@ fn reads(verb: &Verb) -> Reads {
         emulated_memory: matches!(verb, Verb::Serve(_)),
         manager: !matches!(verb, Verb::Model(_)),
         accelerator: match verb {
-            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => true,
+            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
+                true
+            }
             Verb::Compare(_) => true,
             // The step of a folder is measured without taking it.
             Verb::Formats(args) => args.takes_steps(),

@@ -412,11 +412,24 @@ fn the_largest_numbers_are_taken() {
 }
 
 #[test]
+fn a_warm_start_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes_at_most() {
+    let document = document(&["--section", "warm"]);
+    let of = |way| row(&document, "warm", &[("profile", "float"), ("applied", way)]);
+    let chosen = of("in a pass in front of each kind");
+    near(&chosen["more_cycles_percent"], 24.3, 0.1);
+    near(&chosen["more_bytes_percent"], 30.8, 0.1);
+    let other = of("in the first pass (not built)");
+    near(&other["more_cycles_percent"], 0.0, 0.0);
+    near(&other["more_bytes_percent"], 6.8, 0.1);
+}
+
+#[test]
 fn what_excludes_each_other_is_refused_with_2() {
     for (arguments, said) in [
         (&["--json", "--markdown"][..], "exclude each other"),
         (&["--section", "mixed", "--profile", "half"], "--profile mixed"),
         (&["--section", "windowed", "--profile", "mixed"], "--profile windowed or windowed16"),
+        (&["--section", "warm", "--profile", "half"], "--profile naive or float"),
         (&["--profile", "quarter"], "naive, float, half, mixed, windowed, windowed16, all"),
         (&["--section", "tables"], "possible values"),
         (&["--bodies", "5"], "--collisions"),

@@ -109,6 +109,31 @@ fn the_spin_damping_is_that_of_the_command_line() {
 }
 
 #[test]
+fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
+    let of = |options: &str| document(&format!("--grid 1x6x1 --steps 240 {options}"));
+    let passes = "--contact-iterations 4 --friction-iterations 4";
+    let (cold, warm) = (of(passes), of(&format!("{passes} --warm-start")));
+    assert_eq!(
+        (&cold["config"]["warm_start"], &cold["steps"][239]["passes"]),
+        (&false.into(), &8.into())
+    );
+    assert_eq!(
+        (&warm["config"]["warm_start"], &warm["steps"][239]["passes"]),
+        (&true.into(), &10.into())
+    );
+    let deepest =
+        |of: &Value| of["steps"][239]["deepest_penetration_m"].as_f64().expect("a number");
+    assert!(deepest(&warm) < 0.5 * deepest(&cold), "{} m, {} m", deepest(&warm), deepest(&cold));
+    let refused = run("run --profile half --grid 2x2x2 --warm-start".split(' '));
+    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("a warm start") && refused.stderr.contains("naive"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
 fn iterations_and_time_step_are_those_of_the_command_line() {
     let options =
         "--grid 2x2x2 --steps 2 --contact-iterations 3 --friction-iterations 2 --dt 1/120";

@@ -297,7 +297,12 @@ impl Emitter<'_> {
         } else {
             ""
         };
-        line!(text, "  {} {parameters}{name} ({}, .y({name}_y));", operator.module, ports.join(", "));
+        line!(
+            text,
+            "  {} {parameters}{name} ({}, .y({name}_y));",
+            operator.module,
+            ports.join(", ")
+        );
         for node in unit.phases.iter().flatten() {
             for part in self.parts(*node) {
                 let bits = match (width, *part) {

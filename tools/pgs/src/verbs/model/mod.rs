@@ -12,12 +12,14 @@ mod render;
 mod report;
 mod scene;
 mod step;
+mod warm;
 mod window;
 
 use std::io::Write;
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::{StepShape, thesis};
+use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::profile::{Inertia, MIXED, PROFILES, Profile, Variant};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
@@ -91,6 +93,8 @@ enum Section {
     Streams,
     /// Block RAM ports and the initiation interval
     Ports,
+    /// Warm start
+    Warm,
     /// Speed-up and energy (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)
     Comparison,
     /// Explicit integration (Figure 2.6)
@@ -107,6 +111,7 @@ impl Section {
             Self::Memory => memory::tables(scene),
             Self::Streams => memory::streams(scene),
             Self::Ports => ports::tables(scene),
+            Self::Warm => warm::tables(scene),
             Self::Comparison => comparison::tables(scene),
             Self::Euler => euler::tables(),
         }
@@ -139,7 +144,7 @@ impl ModelArgs {
         }
     }
 
-    /// Refuses the sections `mixed` and `windowed` without their profiles.
+    /// Refuses the sections `mixed`, `windowed` and `warm` without their profiles.
     fn check(&self, json: bool) -> Result<(), Failure> {
         if json && self.markdown {
             return Err(Failure::input("--json and --markdown exclude each other")
@@ -159,6 +164,18 @@ impl ModelArgs {
                 format!("the section windowed has nothing about profile {}", self.profile);
             return Err(Failure::input(message)
                 .next("ask for --profile windowed or windowed16, or for all"));
+        }
+        let starts_warm = |profile: &&'static Profile| {
+            Extensions::possible(&profile.default_variant()).warm_start
+                && [ALL, profile.name].contains(&&*self.profile)
+        };
+        if self.section.contains(&Section::Warm)
+            && !PROFILES.iter().copied().any(|profile| starts_warm(&profile))
+        {
+            let message = format!("the section warm has nothing about profile {}", self.profile);
+            return Err(
+                Failure::input(message).next("ask for --profile naive or float, or for all")
+            );
         }
         Ok(())
     }
