@@ -3,7 +3,7 @@
 use bitstream_model::EmulatedBoard;
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, BodyArrays, CollisionArrays, Error, Fault, OpenOptions,
-    StepParameters, StepReport,
+    StepParameters, StepReport, WarmCollisions,
 };
 
 use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};
@@ -66,7 +66,9 @@ fn step(
     tally: &mut Tally,
 ) {
     let passes = if input.one_in(64) { 12 } else { 3 };
-    let parameters = parameters(input, passes, InvalidValues::Sometimes);
+    let extensions = accelerator.capabilities().extensions;
+    let parameters = parameters(input, passes, InvalidValues::Sometimes, extensions);
+    scene.suit(input, &parameters, InvalidValues::Sometimes);
     let first = layout(input);
     let again = input.one_in(4).then(|| layout(input));
     let (bodies, ended) = step_in(first, accelerator, scene, &parameters);
@@ -101,7 +103,9 @@ fn step(
 fn check_refusal(error: &Error) {
     let by_input = match error {
         Error::Input(_) => true,
-        Error::Step { fault, .. } => matches!(**fault, Fault::NotFinite { .. }),
+        Error::Step { fault, .. } => {
+            matches!(**fault, Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. })
+        }
         _ => false,
     };
     assert!(by_input && !error.must_reopen(), "{error}: {error:?}");
@@ -122,10 +126,11 @@ fn step_in(
     scene: &Scene,
     parameters: &StepParameters,
 ) -> (Vec<Body>, Result<StepReport, Error>) {
+    let impulses = &scene.impulses[..];
     match layout {
         Layout::Structures => {
             let mut bodies = scene.bodies.clone();
-            let ended = accelerator.step(&mut bodies, &scene.collisions, parameters);
+            let ended = accelerator.step(&mut bodies, &scene.given(), parameters);
             (bodies, ended)
         }
         Layout::Separate => {
@@ -140,13 +145,15 @@ fn step_in(
                 angular_velocities: &mut separate.angular,
                 shapes: &separate.shapes,
             };
-            let ended = accelerator.step(&mut bodies, &collisions, parameters);
+            let warm = WarmCollisions { collisions: &collisions, impulses };
+            let ended = accelerator.step(&mut bodies, &warm, parameters);
             (separate.bodies(), ended)
         }
         Layout::Strided(gap) => {
             let mut bodies = StridedBodies::new(&scene.bodies, gap);
             let collisions = StridedCollisions::new(&scene.collisions, gap);
-            let ended = accelerator.step(&mut bodies, &collisions, parameters);
+            let warm = WarmCollisions { collisions: &collisions, impulses };
+            let ended = accelerator.step(&mut bodies, &warm, parameters);
             (bodies.bodies(), ended)
         }
     }

@@ -150,29 +150,41 @@ fn open_faulty(input: &mut Input<'_>, board: &EmulatedBoard, config: &BoardConfi
     plan
 }
 
+/// The bits of a step's results: the bodies, and the impulses if they come out.
+fn outcome(bodies: &[Body], accelerator: &Accelerator) -> Vec<u32> {
+    let mut outcome = bits(bodies);
+    for impulses in accelerator.impulses() {
+        let numbers = impulses.normal.iter().chain(&impulses.friction);
+        outcome.extend(numbers.map(|number| number.to_bits()));
+    }
+    outcome
+}
+
 impl Run {
     /// Opens a board, and takes a step on it without faults; none if that step fails by its input,
     /// or has no bodies.
     fn new(input: &mut Input<'_>, board: &EmulatedBoard) -> Option<Self> {
         let port = board.cpu_port();
         let mut accelerator = open(&port).expect("nothing is wrong with the board");
-        let scene = Scene::any(input, 8, 8, InvalidValues::Never);
+        let mut scene = Scene::any(input, 8, 8, InvalidValues::Never);
         if scene.bodies.is_empty() {
             // Such a step does not reach the board.
             return None;
         }
         accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
-        let mut parameters = parameters(input, 3, InvalidValues::Never);
+        let extensions = accelerator.capabilities().extensions;
+        let mut parameters = parameters(input, 3, InvalidValues::Never, extensions);
+        scene.suit(input, &parameters, InvalidValues::Never);
         // With hazards, the result of a pipeline that does not wait depends on the arrival of
         // beats.
         parameters.order = None;
         parameters.deadline = Some(DEADLINE);
         let mut bodies = scene.bodies.clone();
-        if let Err(error) = accelerator.step(&mut bodies, &scene.collisions, &parameters) {
+        if let Err(error) = accelerator.step(&mut bodies, &scene.given(), &parameters) {
             assert!(!error.may_retry() && !error.must_reopen(), "nothing is wrong: {error:?}");
             return None;
         }
-        let expected = bits(&bodies);
+        let expected = outcome(&bodies, &accelerator);
         let (board, tally) = (board.clone(), Tally { steps: 1, ..Tally::default() });
         Some(Self { board, port, accelerator, scene, parameters, expected, tally })
     }
@@ -215,14 +227,14 @@ impl Run {
     fn step(&mut self, plan: &FaultPlan) -> Result<(), Error> {
         let mut bodies: Vec<Body> = self.scene.bodies.clone();
         let begin = self.port.now();
-        let ended = self.accelerator.step(&mut bodies, &self.scene.collisions, &self.parameters);
+        let ended = self.accelerator.step(&mut bodies, &self.scene.given(), &self.parameters);
         let took = self.port.now() - begin;
         let limit = (DEADLINE + RECOVERY) * (1 + self.parameters.retries);
         assert!(took <= limit, "{plan}: the step took {took:?}");
         match ended {
             Ok(_) => {
                 self.tally.steps += 1;
-                if bits(&bodies) != self.expected {
+                if outcome(&bodies, &self.accelerator) != self.expected {
                     // Two wrong words may have the right sum.
                     let corrupt = |fault: &&Fault| matches!(fault.kind, FaultKind::Corrupt { .. });
                     let corrupt = plan.faults.iter().filter(corrupt).map(|fault| fault.times);

@@ -1,7 +1,11 @@
 //! Makes small scenes and parameters for the driver: mostly valid, sometimes invalid ones.
 
+use zynq_pgs::interface::extension::Extensions;
 use zynq_pgs::order::{Order, Ties};
-use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
+use zynq_pgs::{
+    Body, CONTACT_POINTS, Collision, Contact, Impulses, Pose, Shape, StepParameters, Velocity,
+    WarmCollisions,
+};
 
 use crate::input::Input;
 
@@ -11,6 +15,8 @@ pub(super) struct Scene {
     pub(super) shapes: Vec<Shape>,
     pub(super) bodies: Vec<Body>,
     pub(super) collisions: Vec<Collision>,
+    /// One for each collision.
+    pub(super) impulses: Vec<Impulses>,
 }
 
 /// Whether a scene may hold invalid values.
@@ -59,9 +65,50 @@ impl Scene {
                 }
             }
         }
-        let collisions =
+        let collisions: Vec<Collision> =
             pairs.into_iter().map(|pair| collision(input, pair, &bodies, wild)).collect();
-        Self { shapes, bodies, collisions }
+        let impulses = vec![Impulses::ZERO; collisions.len()];
+        Self { shapes, bodies, collisions, impulses }
+    }
+
+    /// The collisions, with the impulses that they begin with.
+    pub(super) fn given(&self) -> WarmCollisions<'_, [Collision]> {
+        WarmCollisions { collisions: &self.collisions, impulses: &self.impulses }
+    }
+
+    /// Gives the scene what only a step with these parameters takes: velocities of static bodies,
+    /// frictions of pairs, impulses to begin with.
+    pub(super) fn suit(
+        &mut self,
+        input: &mut Input<'_>,
+        parameters: &StepParameters,
+        invalid: InvalidValues,
+    ) {
+        for body in self.bodies.iter_mut().filter(|body| body.shape == 0) {
+            body.velocity = Velocity::default();
+            if parameters.kinematic && input.one_in(2) {
+                body.velocity =
+                    Velocity { linear: vector(input, 2.0), angular: vector(input, 1.0) };
+            }
+        }
+        for collision in self.collisions.iter_mut().filter(|of| (1..=4).contains(&of.points())) {
+            collision.count = collision.points();
+            if parameters.pair_friction {
+                let wild = invalid == InvalidValues::Sometimes && input.one_in(200);
+                let friction = if wild { f32::from_bits(input.word()) } else { 0.25 };
+                *collision = collision.with_friction(friction * f32::from(input.byte() % 8));
+            }
+        }
+        self.impulses.resize(self.collisions.len(), Impulses::ZERO);
+        if parameters.warm_start {
+            for impulses in &mut self.impulses {
+                let [x, y, z] = vector(input, 0.25);
+                *impulses = Impulses { normal: [x.abs(), y.abs(), z, 0.0], friction: [y, z] };
+                if invalid == InvalidValues::Sometimes && input.one_in(200) {
+                    impulses.normal[input.index(CONTACT_POINTS)] = f32::from_bits(input.word());
+                }
+            }
+        }
     }
 }
 
@@ -142,11 +189,13 @@ fn collision(
     collision
 }
 
-/// Parameters; at most `passes` iterations of each solver.
+/// Parameters; at most `passes` iterations of each solver. They ask for the extensions that the board
+/// has; where values may be invalid, also for others.
 pub(super) fn parameters(
     input: &mut Input<'_>,
     passes: u32,
     invalid: InvalidValues,
+    extensions: Extensions,
 ) -> StepParameters {
     let mut parameters = StepParameters::default();
     parameters.time_step = input.pick(&[1.0 / 60.0, 1.0 / 240.0, 0.125]);
@@ -163,6 +212,15 @@ pub(super) fn parameters(
     }
     if switches & 16 == 16 {
         parameters.spin_damping = input.pick(&[0.0, 0.5, 1.0]);
+    }
+    let all = invalid == InvalidValues::Sometimes && input.one_in(64);
+    let of = if all { Extensions::ALL } else { extensions };
+    if switches & 96 == 96 {
+        let wanted = input.byte();
+        parameters.kinematic = of.kinematic && wanted & 1 == 1;
+        parameters.pair_friction = of.pair_friction && wanted & 2 == 2;
+        parameters.warm_start = of.warm_start && wanted & 4 == 4;
+        parameters.impulses_out = of.warm_start && wanted & 8 == 8;
     }
     if switches & 12 == 12 {
         parameters.order = Some(input.pick(&[

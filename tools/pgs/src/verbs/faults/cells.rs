@@ -165,7 +165,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     let packets: Vec<_> = bench
         .packets
         .iter()
-        .filter(|packet| packet.phase.is_some_and(|phase| is_tried(phase, bench.iterations())))
+        .filter(|packet| packet.phase.is_some_and(|phase| is_tried(phase, bench.passes())))
         .collect();
     let mut cells = Vec::new();
     let mut at_last = 0;
@@ -264,7 +264,7 @@ fn resets(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
 fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
     let mut phases: Vec<StepPhase> = Vec::new();
     for phase in bench.packets.iter().filter_map(|packet| packet.phase) {
-        let tried = phase != StepPhase::Results && is_tried(phase, bench.iterations());
+        let tried = phase != StepPhase::Results && is_tried(phase, bench.passes());
         if tried && !phases.contains(&phase) {
             phases.push(phase);
         }

@@ -11,6 +11,7 @@ mod trial;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::profile::{PROFILES, Profile};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -19,7 +20,7 @@ use serde_json::{Value, json};
 
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
-use self::trial::{Bench, CellResult};
+use self::trial::{Bench, CellResult, Start};
 use crate::common::{AcceleratorChoice, CommonArgs};
 use crate::environment;
 use crate::failure::{Failure, Verdict};
@@ -35,6 +36,7 @@ Examples:
   pgs faults --accelerator rtl:target/rtl/pgs-rtl     stream faults, on the generated hardware too
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
+Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go out.
 A cell is one fault at one place. It passes if the fault happened, and
 
   a fatal fault    was named correctly, with its channel, before the deadline, and changed no body
@@ -55,7 +57,8 @@ pub(crate) struct FaultsArgs {
 
 /// The results of a profile's cells.
 struct ProfileResults {
-    profile: &'static Profile,
+    /// The profile, and whether its steps start warm.
+    name: String,
     cells: Vec<(Cell, CellResult)>,
     impossible: Vec<Impossible>,
 }
@@ -78,17 +81,27 @@ pub(crate) fn run(
         None => PROFILES.to_vec(),
     };
     let mut all = Vec::new();
-    for profile in profiles {
-        let bench = Bench::new(profile)?;
+    let starts = |profile: &'static Profile| {
+        let warm = Extensions::possible(&profile.default_variant()).warm_start;
+        [Start::Cold, Start::Warm].into_iter().filter(move |start| warm || *start == Start::Cold)
+    };
+    let settings =
+        profiles.into_iter().flat_map(|profile| starts(profile).map(move |start| (profile, start)));
+    for (profile, start) in settings {
+        let bench = Bench::new(profile, start)?;
         let (cells, impossible) = cells::of(&bench);
+        let name = match start {
+            Start::Cold => profile.name.to_owned(),
+            Start::Warm => format!("{}+warm", profile.name),
+        };
         if args.list {
             for cell in &cells {
-                writeln!(out, "{:10} {}", profile.name, cell.plan)?;
+                writeln!(out, "{name:12} {}", cell.plan)?;
             }
             continue;
         }
         let cells = try_all(&bench, cells);
-        all.push(ProfileResults { profile, cells, impossible });
+        all.push(ProfileResults { name, cells, impossible });
     }
     if args.list {
         return Ok(Verdict::Done);
@@ -125,10 +138,10 @@ fn to_json(all: &[ProfileResults]) -> Value {
     let profiles: Vec<_> = all
         .iter()
         .map(|tried| {
-            let ProfileResults { profile, cells, impossible } = tried;
+            let ProfileResults { name, cells, impossible } = tried;
             let tally = Tally::of(cells.iter());
             json!({
-                "profile": profile.name,
+                "profile": name,
                 "tally": tally.to_json(),
                 "impossible": impossible.iter().map(|what| json!({
                     "what": what.what,

@@ -100,15 +100,9 @@ pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<(
     line(out, &COLUMNS, Tally::of(cells()).cells("all", ""))?;
 
     writeln!(out)?;
-    for ProfileResults { profile, cells, .. } in all {
+    for ProfileResults { name, cells, .. } in all {
         let Tally { tried, passed, .. } = Tally::of(cells.iter());
-        writeln!(
-            out,
-            "profile {:10} {} of {} passed",
-            profile.name,
-            grouped(passed),
-            grouped(tried)
-        )?;
+        writeln!(out, "profile {:12} {} of {} passed", name, grouped(passed), grouped(tried))?;
     }
     let mut phases: Vec<String> = Vec::new();
     for (cell, _) in cells() {
@@ -128,12 +122,12 @@ pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<(
         let what = these.map(|impossible| impossible.what).next().unwrap_or_default();
         writeln!(out, "not tried: {what} ({} cells)", grouped(count as u64))?;
     }
-    for ProfileResults { profile, cells, .. } in all {
+    for ProfileResults { name, cells, .. } in all {
         for (cell, found) in cells.iter().filter(|(_, found)| !found.passed()) {
             writeln!(
                 out,
                 "FAILED {} '{}': {}; cause {}, expected {:?}",
-                profile.name,
+                name,
                 cell.plan,
                 found.failed_checks().join(", "),
                 found.cause.unwrap_or("none"),

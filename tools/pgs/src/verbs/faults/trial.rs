@@ -8,7 +8,8 @@ use bitstream_model::{
 };
 use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::{
-    Accelerator, Aftermath, BoardChoice, Body, Collision, Error, OpenOptions, Shape, StepParameters,
+    Accelerator, Aftermath, BoardChoice, Body, Collision, ContactMemory, Error, Impulses,
+    OpenOptions, Shape, StepParameters, WarmCollisions,
 };
 
 use super::cells::Cell;
@@ -27,6 +28,8 @@ const RECOVERY: Duration = Duration::from_millis(60);
 const LENGTH_WIDTH: u32 = 8;
 /// FIFOs so short that a channel cannot run ahead of the accelerator by a whole step.
 const FIFO_BEATS: usize = 16;
+/// Reach of a contact from one step to the next, m.
+const REACH: f32 = 0.05;
 /// Steps until cubes dropped from 0.05 m lie on each other.
 const SETTLING: u32 = 12;
 
@@ -36,6 +39,10 @@ struct State {
     shapes: Vec<Shape>,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
+    /// The impulses that the collisions begin with: zeros in a cold step.
+    impulses: Vec<Impulses>,
+    /// The impulses that come out of a step without faults, if they do.
+    impulses_after: Vec<Impulses>,
     /// The bits after a step without faults, and the step's time on the board's clock.
     after: Vec<[u32; 13]>,
     takes: Duration,
@@ -125,34 +132,62 @@ fn reopen(board: &EmulatedBoard) -> Result<Accelerator, Error> {
     Accelerator::open(OpenOptions { board, ..OpenOptions::default() })
 }
 
+/// How the steps of a setting begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Start {
+    Cold,
+    /// With the impulses of the step before; they come out, too.
+    Warm,
+}
+
+impl Start {
+    fn parameters(self) -> StepParameters {
+        let warm = self == Self::Warm;
+        StepParameters::default().with_warm_start(warm).with_impulses_out(warm)
+    }
+}
+
 impl State {
+    /// The collisions, with the impulses that they begin with.
+    fn given(&self) -> WarmCollisions<'_, [Collision]> {
+        WarmCollisions { collisions: &self.collisions, impulses: &self.impulses }
+    }
+
     /// A pile of cubes some steps after its drop, on a board without faults.
-    fn settled(side: u16, config: BoardConfig) -> Result<Self, Failure> {
+    fn settled(side: u16, config: BoardConfig, start: Start) -> Result<Self, Failure> {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
-        let parameters = StepParameters::default();
+        let parameters = start.parameters();
+        let mut memory = ContactMemory::new(REACH);
         for _ in 0..SETTLING {
             scene.detect();
             let (bodies, collisions) = scene.parts_mut();
-            accelerator.step(bodies, collisions, &parameters).map_err(Failure::input)?;
+            let impulses = memory.recall(collisions, 1.0);
+            let warm = WarmCollisions { collisions, impulses: &impulses };
+            accelerator.step(bodies, &warm, &parameters).map_err(Failure::input)?;
+            memory.remember(collisions, accelerator.impulses());
         }
         scene.detect();
         let mut after = Vec::new();
         let collisions = scene.collisions().to_vec();
+        let impulses = memory.recall(&collisions, 1.0);
         let (port, mut takes) = (emulated.cpu_port(), Duration::ZERO);
         // From the second step on the channels are running.
         for _ in 0..2 {
             after = scene.bodies().to_vec();
             let begin = port.now();
-            accelerator.step(&mut after, &collisions, &parameters).map_err(Failure::input)?;
+            let warm = WarmCollisions { collisions: &collisions, impulses: &impulses };
+            accelerator.step(&mut after, &warm, &parameters).map_err(Failure::input)?;
             takes = port.now().saturating_sub(begin);
         }
         Ok(Self {
             shapes: scene.shapes().to_vec(),
             bodies: scene.bodies().to_vec(),
+            impulses_after: accelerator.impulses().to_vec(),
             collisions,
+            impulses,
             after: bits(&after),
             takes,
         })
@@ -161,11 +196,11 @@ impl State {
 
 impl Bench {
     /// The setting of a profile, with a pile of 27 cubes and one of 64, for the model.
-    pub(super) fn new(profile: &'static Profile) -> Result<Self, Failure> {
+    pub(super) fn new(profile: &'static Profile, start: Start) -> Result<Self, Failure> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let length_width = LENGTH_WIDTH;
         let config = BoardConfig { profile, length_width, delays, ..BoardConfig::default() };
-        Self::of(config, DEADLINE)
+        Self::of(config, start, DEADLINE)
     }
 
     /// The setting of a board that equals one with a simulator, for the model.
@@ -173,16 +208,16 @@ impl Bench {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let subnormals = Subnormals::Flush;
         let config = BoardConfig { profile, delays, subnormals, ..BoardConfig::default() };
-        Self::of(config, SIMULATOR_DEADLINE)
+        Self::of(config, Start::Cold, SIMULATOR_DEADLINE)
     }
 
-    fn of(config: BoardConfig, deadline: Duration) -> Result<Self, Failure> {
-        let (small, large) = (State::settled(3, config)?, State::settled(4, config)?);
-        let parameters = StepParameters::default().with_deadline(deadline);
+    fn of(config: BoardConfig, start: Start, deadline: Duration) -> Result<Self, Failure> {
+        let (small, large) = (State::settled(3, config, start)?, State::settled(4, config, start)?);
+        let parameters = start.parameters().with_deadline(deadline);
         let accelerator = AcceleratorChoice::Model;
         let (board, mut driver) = open(config, &accelerator, &small.shapes)?;
         let mut bodies = small.bodies.clone();
-        driver.step(&mut bodies, &small.collisions, &parameters).map_err(Failure::input)?;
+        driver.step(&mut bodies, &small.given(), &parameters).map_err(Failure::input)?;
         let packets = board.packets();
         Ok(Self { config, packets, small, large, parameters, accelerator, deadline })
     }
@@ -192,9 +227,11 @@ impl Bench {
         Self { accelerator, ..self }
     }
 
-    /// Contact and friction passes.
-    pub(super) fn iterations(&self) -> [u32; 2] {
-        [self.parameters.contact_iterations, self.parameters.friction_iterations]
+    /// Contact and friction passes, the warm ones included.
+    pub(super) fn passes(&self) -> [u32; 2] {
+        let StepParameters { contact_iterations, friction_iterations, warm_start, .. } =
+            self.parameters;
+        [contact_iterations, friction_iterations].map(|count| count + u32::from(warm_start))
     }
 
     pub(super) fn streams_once(&self) -> bool {
@@ -211,7 +248,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     };
     let mut step = |accelerator: &mut Accelerator, state: &State| {
         let mut bodies = state.bodies.clone();
-        let result = accelerator.step(&mut bodies, &state.collisions, &bench.parameters);
+        let result = accelerator.step(&mut bodies, &state.given(), &bench.parameters);
         (result, bits(&bodies))
     };
     let (small, port) = (&bench.small, board.cpu_port());
@@ -265,7 +302,10 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
             _ => found.elapsed > state.takes,
         };
     }
-    found.next = next.is_ok() && bodies == small.after && board.violations().is_empty();
+    found.next = next.is_ok()
+        && bodies == small.after
+        && accelerator.impulses() == small.impulses_after
+        && board.violations().is_empty();
     found
 }
 
