@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::fault::Fault;
 use crate::order::Schedule;
 use crate::platform::Deadline;
-use crate::scene::Bodies;
+use crate::scene::{Bodies, Impulses};
 use crate::validate::InputError;
 
 /// A step that the board works on.
@@ -77,6 +77,13 @@ impl<'a> InFlight<'a> {
             let ended = self.collect(bodies)?;
             self.finish(ended, bodies)
         })
+    }
+
+    /// The impulses of the step before, while this one is on the board:
+    /// [`Accelerator::impulses`].
+    #[must_use]
+    pub fn impulses(&self) -> &[Impulses] {
+        self.accelerator.impulses()
     }
 
     /// Checks, reads and stores the results.

@@ -155,7 +155,7 @@ impl InFlight<'_> {
         self.flight.watch.lap();
         let report = ended.and_then(|ended| match self.read(&ended, bodies) {
             Ok(()) => Ok(self.commit(ended, bodies)),
-            Err(fault @ Fault::NotFinite { .. }) => {
+            Err(fault @ (Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. })) => {
                 let fault = Box::new(fault);
                 let aftermath = Aftermath::Untouched;
                 Err(self.located(Error::Step { fault, aftermath, diagnosis: None }))

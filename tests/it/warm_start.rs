@@ -268,6 +268,33 @@ fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
 }
 
 #[test]
+fn a_prepared_step_starts_warm_and_the_impulses_of_the_one_before_are_read_meanwhile() {
+    let (bodies, collisions) = scene(5);
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let parameters = warm(Order::AsGiven);
+    let given: Vec<Impulses> = (0..collisions.len())
+        .map(|at| Impulses { normal: [0.01 * at as f32; 4], friction: [0.125, -0.25] })
+        .collect();
+    let warm = WarmCollisions { collisions: &collisions, impulses: &given };
+    let (mut expected, mut cold) = (bodies.clone(), bodies.clone());
+    let hot = direct_step_from(Some(&given), &mut expected, &collisions, &shapes(), &parameters);
+    let zeros = vec![Impulses::ZERO; collisions.len()];
+    let first = direct_step_from(Some(&zeros), &mut cold, &collisions, &shapes(), &parameters);
+
+    let (_board, mut accelerator) = open_with(config, None, &shapes());
+    let (mut left, mut right) = (bodies.clone(), bodies);
+    let mut flight = accelerator.submit(&left, &collisions, &parameters).expect("a step");
+    let prepared = flight.prepare(&right, &warm, &parameters).expect("prepared");
+    let (report, started) = flight.wait_and_start(&mut left, &prepared);
+    report.expect("the first step");
+    let started = started.expect("the second step");
+    assert_eq!(words(started.impulses()), words(&first));
+    started.wait(&mut right).expect("the second step");
+    assert_eq!((bits(&left), bits(&right)), (bits(&cold), bits(&expected)));
+    assert_eq!(words(accelerator.impulses()), words(&hot));
+}
+
+#[test]
 fn impulses_of_a_failed_step_are_not_given_out() {
     let (bodies, collisions) = scene(5);
     let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };

@@ -368,6 +368,36 @@ enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 enum zpgs_status zpgs_cancel(const struct zpgs_accelerator *accelerator);
 
+// Checks, orders and packs another step while one is in flight, in place of one that was prepared
+// before. The arrays are the caller's again when the call returns; the step has their values of now,
+// so that it cannot depend on the results of the step in flight.
+//
+// # Safety
+// As `zpgs_step`.
+enum zpgs_status zpgs_prepare(struct zpgs_accelerator *accelerator,
+                              const struct zpgs_bodies *bodies,
+                              const struct zpgs_collisions *collisions,
+                              const struct zpgs_parameters *parameters);
+
+// Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
+// flight: the results are read while the board works on the next step, which is then in flight.
+//
+// The call returns the first failure. If the step in flight has failed and the prepared one was
+// started all the same, `zpgs_wait` ends it as any other; if none is in flight afterwards,
+// `zpgs_wait` says so with `ZPGS_STATUS_SEQUENCE`.
+//
+// # Safety
+// As `zpgs_step`.
+enum zpgs_status zpgs_wait_and_start(struct zpgs_accelerator *accelerator,
+                                     const struct zpgs_bodies *bodies,
+                                     struct zpgs_report *report);
+
+// Starts the prepared step, with none in flight. It may be started again, as after a fault.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
+enum zpgs_status zpgs_start(struct zpgs_accelerator *accelerator);
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus

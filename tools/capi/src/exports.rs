@@ -307,7 +307,7 @@ pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> S
 }
 
 /// Refuses a warm start without impulses, which would be a cold one that takes longer.
-fn check_impulses(
+pub(crate) fn check_impulses(
     collisions: &CollisionsView<'_>,
     parameters: &StepParameters,
 ) -> Result<(), Failure> {
@@ -324,7 +324,7 @@ fn check_impulses(
 ///
 /// # Safety
 /// The pointer is null or leads to the structure, whose arrays are as it describes.
-unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure> {
+pub(crate) unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure> {
     const NONE: Strided = Strided { data: std::ptr::null_mut(), stride: 0 };
     let nothing = BodyArrays {
         size: 0,
@@ -345,7 +345,7 @@ unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure>
 ///
 /// # Safety
 /// The pointer is null or leads to the structure, whose array is as it describes.
-unsafe fn read_collisions<'a>(
+pub(crate) unsafe fn read_collisions<'a>(
     pointer: *const CollisionArray,
 ) -> Result<CollisionsView<'a>, Failure> {
     let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };

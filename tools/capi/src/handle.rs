@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, OpenOptions,
-    StepParameters, StepReport,
+    Prepared, StepParameters, StepReport,
 };
 
 use crate::failure::Failure;
@@ -29,6 +29,7 @@ pub struct AcceleratorHandle {
 pub(crate) struct State {
     accelerator: Accelerator,
     ticket: Option<Detached>,
+    prepared: Option<Prepared>,
 }
 
 impl AcceleratorHandle {
@@ -38,7 +39,7 @@ impl AcceleratorHandle {
         let mut accelerator = Accelerator::open(OpenOptions { board, ..OpenOptions::default() })?;
         let cancellation = Cancellation::new();
         accelerator.set_cancellation(cancellation.clone());
-        let state = Mutex::new(State { accelerator, ticket: None });
+        let state = Mutex::new(State { accelerator, ticket: None, prepared: None });
         Ok(Self { state, cancellation, text: Mutex::default() })
     }
 
@@ -100,11 +101,67 @@ impl State {
         Ok(())
     }
 
+    /// Takes the ticket of the step in flight.
+    fn ticket(&mut self) -> Result<Detached, Failure> {
+        let none = || Failure::sequence("no step is in flight: call zpgs_submit first");
+        self.ticket.take().ok_or_else(none)
+    }
+
+    /// Packs another step while one is in flight.
+    pub(crate) fn prepare(
+        &mut self,
+        bodies: &impl Bodies,
+        collisions: &impl Collisions,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
+        self.prepared = None;
+        let ticket = self.ticket()?;
+        let mut step = self.accelerator.attach(ticket)?;
+        let prepared = step.prepare(bodies, collisions, parameters);
+        // The step in flight goes on, whatever became of the other.
+        self.ticket = Some(step.detach());
+        self.prepared = Some(prepared?);
+        Ok(())
+    }
+
+    /// Ends the step in flight, and starts the prepared one: the outcome of each.
+    pub(crate) fn wait_and_start(
+        &mut self,
+        bodies: &mut impl Bodies,
+    ) -> (Result<StepReport, Failure>, Result<(), Failure>) {
+        let prepared = match prepared(&self.prepared) {
+            Ok(prepared) => prepared,
+            Err(failure) => return (Err(failure), Ok(())),
+        };
+        let none = || Failure::sequence("no step is in flight: call zpgs_start");
+        let ticket = self.ticket.take().ok_or_else(none);
+        let step = ticket.and_then(|ticket| Ok(self.accelerator.attach(ticket)?));
+        let (done, started) = match step {
+            Ok(step) => step.wait_and_start(bodies, prepared),
+            Err(failure) => return (Err(failure), Ok(())),
+        };
+        let started = started.map(|step| self.ticket = Some(step.detach()));
+        (done.map_err(Into::into), started.map_err(Into::into))
+    }
+
+    /// Starts the prepared step.
+    pub(crate) fn start(&mut self) -> Result<(), Failure> {
+        self.idle()?;
+        let step = self.accelerator.start(prepared(&self.prepared)?)?;
+        self.ticket = Some(step.detach());
+        Ok(())
+    }
+
     /// Ends the step in flight.
     pub(crate) fn wait(&mut self, bodies: &mut impl Bodies) -> Result<StepReport, Failure> {
-        let ticket = self.ticket.take();
-        let ticket = ticket
-            .ok_or_else(|| Failure::sequence("no step is in flight: call zpgs_submit first"))?;
+        let ticket = self.ticket()?;
         Ok(self.accelerator.attach(ticket)?.wait(bodies)?)
     }
+}
+
+/// The prepared step.
+fn prepared(prepared: &Option<Prepared>) -> Result<&Prepared, Failure> {
+    let none =
+        || Failure::sequence("no step is prepared: call zpgs_prepare while a step is in flight");
+    prepared.as_ref().ok_or_else(none)
 }

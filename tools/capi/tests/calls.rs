@@ -288,6 +288,35 @@ fn impulses_go_in_and_come_out_at_their_strides() {
 }
 
 #[test]
+fn a_step_is_prepared_while_another_is_in_flight() {
+    let (open, all) = (Open::new("emulated:float"), [collision()]);
+    let (mut left, mut right) = (world(), world());
+    let (all, parameters) = (collisions(&all), defaults());
+    let prepare = |bodies: &BodyArrays| {
+        made!(zpgs_prepare(open.0, from_ref(bodies), from_ref(&all), from_ref(&parameters)))
+    };
+    let wait_and_start =
+        |bodies: &BodyArrays| made!(zpgs_wait_and_start(open.0, from_ref(bodies), null_mut()));
+    assert_eq!(prepare(&arrays(&mut right)), Status::Sequence);
+    assert_eq!(made!(zpgs_start(open.0)), Status::Sequence);
+    assert!(open.text().contains("zpgs_prepare"), "{}", open.text());
+    assert_eq!(open.submit(&arrays(&mut left), &all), Status::Ok, "{}", open.text());
+    assert_eq!(wait_and_start(&arrays(&mut left)), Status::Sequence, "nothing is prepared");
+    assert_eq!(prepare(&arrays(&mut right)), Status::Ok, "{}", open.text());
+    assert_eq!(made!(zpgs_start(open.0)), Status::Sequence, "a step is in flight");
+    assert_eq!(wait_and_start(&arrays(&mut left)), Status::Ok, "{}", open.text());
+    assert_eq!(left, stepped());
+    assert_eq!(open.wait(&arrays(&mut right)), Status::Ok, "{}", open.text());
+    assert_eq!(right, stepped());
+    // Its records are still there.
+    let mut again = world();
+    assert_eq!(made!(zpgs_start(open.0)), Status::Ok, "{}", open.text());
+    assert_eq!(open.wait(&arrays(&mut again)), Status::Ok, "{}", open.text());
+    assert_eq!(again, stepped());
+    assert_eq!(wait_and_start(&arrays(&mut again)), Status::Sequence, "none is in flight");
+}
+
+#[test]
 fn a_cancellation_ends_one_step() {
     let (open, mut crates, all) = (Open::new("emulated:float"), world(), [collision()]);
     let (bodies, all) = (arrays(&mut crates), collisions(&all));

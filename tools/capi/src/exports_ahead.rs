@@ -1,0 +1,88 @@
+//! The calls that prepare a step while another is on the board.
+
+#![allow(unsafe_code, reason = "exported names, and arguments that are raw pointers")]
+
+use crate::arrays::{BodyArrays, CollisionArray};
+use crate::barrier::call_with;
+use crate::exports::{check_impulses, read_bodies, read_collisions};
+use crate::handle::AcceleratorHandle;
+use crate::memory::{self, Out};
+use crate::parameters::Parameters;
+use crate::report::Report;
+use crate::status::Status;
+
+/// Checks, orders and packs another step while one is in flight, in place of one that was prepared
+/// before. The arrays are the caller's again when the call returns; the step has their values of now,
+/// so that it cannot depend on the results of the step in flight.
+///
+/// # Safety
+/// As `zpgs_step`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_prepare(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
+        // and this call alone uses them.
+        let bodies = unsafe { read_bodies(bodies) }?;
+        // SAFETY: `collisions` is null or leads to its structure; no thread writes the arrays in it during
+        // the call.
+        let collisions = unsafe { read_collisions(collisions) }?;
+        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
+        // during the call.
+        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
+        let parameters = parameters.driver()?;
+        check_impulses(&collisions, &parameters)?;
+        state.prepare(&bodies, &collisions, &parameters)
+    })
+}
+
+/// Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
+/// flight: the results are read while the board works on the next step, which is then in flight.
+///
+/// The call returns the first failure. If the step in flight has failed and the prepared one was
+/// started all the same, `zpgs_wait` ends it as any other; if none is in flight afterwards,
+/// `zpgs_wait` says so with `ZPGS_STATUS_SEQUENCE`.
+///
+/// # Safety
+/// As `zpgs_step`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_wait_and_start(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    report: *mut Report,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
+        // and this call alone uses them.
+        let mut bodies = unsafe { read_bodies(bodies) }?;
+        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
+        // uses.
+        let report = unsafe { Out::<Report>::optional(report) }?;
+        let (done, started) = state.wait_and_start(&mut bodies);
+        let done = done?;
+        report.into_iter().for_each(|report| report.write(Report::from(&done)));
+        started
+    })
+}
+
+/// Starts the prepared step, with none in flight. It may be started again, as after a fault.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_start(accelerator: *mut AcceleratorHandle) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| state.start())
+}
