@@ -66,6 +66,8 @@ pub struct Scene {
     geometries: Vec<Option<Geometry>>,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
+    /// The friction of each shape; none if all pairs have the same.
+    frictions: Vec<f32>,
     detector: Detector,
 }
 
@@ -106,6 +108,7 @@ impl Scene {
             geometries: std::iter::once(None).chain(kinds.iter().map(|k| Some(k.1))).collect(),
             bodies: std::iter::once(ground).chain(bodies).collect(),
             collisions: Vec::new(),
+            frictions: Vec::new(),
             detector: Detector::default(),
         }
     }
@@ -164,9 +167,27 @@ impl Scene {
     /// A; of two other bodies, A has the lower index. A body whose pose is not finite collides with
     /// nothing, and a step refuses it.
     pub fn detect(&mut self) -> &[Collision] {
-        let Self { geometries, bodies, collisions, detector, .. } = self;
-        standard(|| detector.detect(bodies, Geometries(geometries), collisions));
+        let Self { geometries, bodies, collisions, detector, frictions, .. } = self;
+        standard(|| {
+            detector.detect(bodies, Geometries(geometries), collisions);
+            let friction_of = |body: u32| {
+                let shape = bodies.get(body as usize).map(|body| body.shape as usize);
+                shape.and_then(|shape| frictions.get(shape)).copied()
+            };
+            for collision in &mut *collisions {
+                let both = friction_of(collision.body_a).zip(friction_of(collision.body_b));
+                if let Some((a, b)) = both {
+                    *collision = collision.with_friction((a * b).sqrt());
+                }
+            }
+        });
         collisions
+    }
+
+    /// Gives each collision a friction of its own from now on: the geometric mean of the frictions of
+    /// both shapes, one for each of [`shapes`](Self::shapes).
+    pub fn set_frictions(&mut self, frictions: &[f32]) {
+        self.frictions = frictions.to_vec();
     }
 }
 

@@ -48,7 +48,7 @@ pub use measure::{
     potential_energy,
 };
 pub use random::SplitMix64;
-pub use shapes::ShapesOptions;
+pub use shapes::{SHAPE_FRICTIONS, ShapesOptions};
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
 
 /// Index of the static ground among the bodies.

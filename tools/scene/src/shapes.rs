@@ -20,6 +20,9 @@ const KINDS: [(Geometry, f32); 8] = [
     (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 4.0),
 ];
 
+/// Frictions of the ground and of the kinds: cubes grip, spheres and capsules slide.
+pub const SHAPE_FRICTIONS: [f32; 1 + KINDS.len()] = [0.8, 0.9, 0.9, 0.3, 0.3, 0.6, 0.6, 0.2, 0.2];
+
 /// Distance between the centres of neighbours, m: no two bodies touch in any orientation.
 const SPACING: f32 = 2.4;
 

@@ -1,7 +1,7 @@
 //! The scene, as chosen on the command line.
 
 use clap::{Args, ValueEnum};
-use scene::{Grid, Inertia, Scene, SceneOptions, ShapesOptions};
+use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
 use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
@@ -103,6 +103,16 @@ impl SceneArgs {
             u64::from(self.grid.cubes()) + 1
         );
         Err(Failure::input(error).next("give a smaller --grid"))
+    }
+
+    /// Gives the collisions of the shapes a friction for each pair.
+    pub(crate) fn give_frictions(&self, scene: &mut Scene) -> Result<(), Failure> {
+        if self.is_cubes() {
+            let error = "--pair-friction is for --scene shapes, the cubes have one friction";
+            return Err(Failure::input(error));
+        }
+        scene.set_frictions(&SHAPE_FRICTIONS);
+        Ok(())
     }
 
     /// Whether these are the thesis' cubes.

@@ -134,6 +134,17 @@ fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
 }
 
 #[test]
+fn shapes_have_a_friction_for_each_pair_and_cubes_have_one() {
+    let shapes = "--scene shapes --inertia world --grid 3x3x3 --steps 60";
+    let (one, own) = (document(shapes), document(&format!("{shapes} --pair-friction")));
+    assert_ne!(one["digest"], own["digest"]);
+    assert_eq!(own["config"]["pair_friction"], true);
+    let refused = run("run --grid 2x2x2 --pair-friction".split(' '));
+    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--scene shapes"), "{}", refused.stderr);
+}
+
+#[test]
 fn iterations_and_time_step_are_those_of_the_command_line() {
     let options =
         "--grid 2x2x2 --steps 2 --contact-iterations 3 --friction-iterations 2 --dt 1/120";

@@ -41,7 +41,7 @@ Examples:
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
-  pgs run --scene shapes --inertia world --grid 8x8x8
+  pgs run --scene shapes --inertia world --pair-friction --warm-start --grid 8x8x8 --steps 600
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
@@ -83,6 +83,9 @@ pub(crate) struct RunArgs {
     /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
     #[arg(long, help_heading = "Solver")]
     warm_start: bool,
+    /// Give each pair of shapes a friction of its own, from both bodies' kinds (--scene shapes)
+    #[arg(long, help_heading = "Solver")]
+    pair_friction: bool,
     #[command(flatten)]
     ordering: OrderingArgs,
     #[command(flatten)]
@@ -101,7 +104,8 @@ impl RunArgs {
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(self.warm_start)
-            .with_impulses_out(self.warm_start);
+            .with_impulses_out(self.warm_start)
+            .with_pair_friction(self.pair_friction);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
@@ -135,6 +139,9 @@ pub(crate) fn run(
     let mut opened = board::open(common, &args.build.build())?;
     args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&args.build.build())?;
+    if args.pair_friction {
+        args.scene.give_frictions(&mut scene)?;
+    }
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
@@ -284,6 +291,7 @@ fn document(
     config["time_step_s"] = parameters.time_step.into();
     config["spin_damping"] = parameters.spin_damping.into();
     config["warm_start"] = parameters.warm_start.into();
+    config["pair_friction"] = parameters.pair_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
     let summary = summary(args, parameters, opened, scene, &course);
