@@ -10,19 +10,21 @@ namespace {
 enum Exit { OK = 0, LIMIT = 1, USAGE = 2, SKIPPED = 77 };
 
 const char USAGE_TEXT[] =
-    "usage: bullet-client [SCENE...] [--board TEXT] [--iterations N] [--points N] [--json] [--list] "
-    "[--help]\n"
+    "usage: bullet-client [SCENE...] [--board TEXT] [--iterations N] [--points N] [--reverse N] [--cold] "
+    "[--json] [--list] [--help]\n"
     "\n"
-    "Runs scenes of Bullet on Bullet's own solver, which starts warm, and on the board's, and prints both.\n"
-    "Without a scene: all but `time`.\n"
+    "Runs scenes of Bullet on Bullet's own solver and on the board's, and prints both.\n"
+    "Without a scene: all but `spread` and `time`.\n"
     "\n"
     "  --board TEXT      the board, as in docs/c.md (emulated:float,world)\n"
-    "  --iterations N    passes of contact and of friction, 1 to 255, in place of each scene's own; limits "
-    "are\n"
-    "                    then shown and do not count\n"
-    "  --points N        largest number of points of a collision, 1 to 4 (4)\n"
+    "  --iterations N    passes of contact and of friction, 1 to 255, in place of each scene's own\n"
+    "  --points N        largest number of points of a collision, 1 to 4 (2)\n"
+    "  --reverse N       reverse the order of the collisions every N steps, 0 to 1000 (3; 0 is never)\n"
+    "  --cold            begin every step with impulses of 0 on the board; Bullet's own solver stays warm\n"
     "  --json            the table as JSON\n"
     "  --list            the scenes\n"
+    "\n"
+    "With --iterations, --points, --reverse or --cold the limits are shown and do not count.\n"
     "\n"
     "exit status: 0; 1 a limit does not hold; 2 wrong usage; 77 the board does not open, nothing was run\n";
 
@@ -64,6 +66,8 @@ const std::vector<Scene> &scenes() {
         {"ccd", "a fast ball against a thin wall", ccd, false},
         {"joints", "a chain, which stays Bullet's, beside boxes on the board", joints, false},
         {"masses", "more masses than the board's 64", masses, false},
+        {"warm", "1,000 jumbled cubes, a step with the last one's impulses and one without", warmth, false},
+        {"spread", "pile and tower, the bodies shifted by at most 1 mm", spread, true},
         {"time", "a step of jumbled cubes, both solvers on the same contacts, 10 + 10 passes", timing, true},
     };
     return all;
@@ -84,7 +88,10 @@ int main(int count, char **arguments) {
             return OK;
         } else if (argument == "--json") {
             json = true;
-        } else if (argument == "--board" || argument == "--iterations" || argument == "--points") {
+        } else if (argument == "--cold") {
+            settings.solver.warmStart = false;
+        } else if (argument == "--board" || argument == "--iterations" || argument == "--points" ||
+                   argument == "--reverse") {
             if (!value) return usage(argument + " needs a value");
             i++;
             if (argument == "--board") {
@@ -92,7 +99,10 @@ int main(int count, char **arguments) {
             } else if (argument == "--iterations") {
                 if (!toNumber(value, 1, 255, settings.iterations))
                     return usage("expected 1 to 255 after --iterations, found " + std::string(value));
-            } else if (!toNumber(value, 1, ZPGS_CONTACT_POINTS, settings.points)) {
+            } else if (argument == "--reverse") {
+                if (!toNumber(value, 0, 1000, settings.solver.reverseEvery))
+                    return usage("expected 0 to 1000 after --reverse, found " + std::string(value));
+            } else if (!toNumber(value, 1, ZPGS_CONTACT_POINTS, settings.solver.pointsPerCollision)) {
                 return usage("expected 1 to 4 after --points, found " + std::string(value));
             }
         } else if (const Scene *scene = find(argument)) {

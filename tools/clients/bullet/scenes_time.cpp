@@ -8,36 +8,47 @@
 
 namespace {
 
-// Bullet's solver, which the world follows. While `beside` is set the other solver gets every group first;
-// what it wrote is then put back.
+// Solves beside the one that the world follows.
+struct Beside {
+    ZynqPgsSolver &solver;
+    std::vector<double> seconds, hostSeconds;
+    double boardSeconds = 0, cycles = 0;
+};
+
+double since(std::clock_t start) { return double(std::clock() - start) / CLOCKS_PER_SEC; }
+
+// Bullet's solver, which the world follows. While `measures` is set the others get every group first; what
+// they wrote is then put back.
 class Shadow : public btSequentialImpulseConstraintSolver {
 public:
-    explicit Shadow(ZynqPgsSolver &other) : m_other(other) {}
-    bool beside = false;
-    std::vector<double> ownSeconds, otherSeconds, otherHostSeconds;
-    double boardSeconds = 0;
+    bool measures = false;
+    std::vector<Beside> others;
+    std::vector<double> ownSeconds;
 
     btScalar solveGroup(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds,
                         int numManifolds, btTypedConstraint **constraints, int numConstraints,
                         const btContactSolverInfo &info, btIDebugDraw *debugDrawer,
                         btDispatcher *dispatcher) override {
-        if (beside) {
+        for (size_t i = 0; measures && i < others.size(); i++) {
+            Beside &other = others[i];
             const Kept kept(bodies, numBodies, manifolds, numManifolds);
-            const double library = m_other.counts().librarySeconds;
+            const ZynqPgsCounts &counts = other.solver.counts();
+            const double library = counts.librarySeconds;
             const std::clock_t start = std::clock();
-            m_other.prepareSolve(numBodies, numManifolds);
-            m_other.solveGroup(bodies, numBodies, manifolds, numManifolds, constraints, numConstraints, info,
-                               debugDrawer, dispatcher);
-            m_other.allSolved(info, debugDrawer);
-            otherSeconds.push_back(since(start));
-            otherHostSeconds.push_back(otherSeconds.back() - (m_other.counts().librarySeconds - library));
-            boardSeconds += m_other.counts().report.seconds;
+            other.solver.prepareSolve(numBodies, numManifolds);
+            other.solver.solveGroup(bodies, numBodies, manifolds, numManifolds, constraints, numConstraints,
+                                    info, debugDrawer, dispatcher);
+            other.solver.allSolved(info, debugDrawer);
+            other.seconds.push_back(since(start));
+            other.hostSeconds.push_back(other.seconds.back() - (counts.librarySeconds - library));
+            other.boardSeconds += counts.report.seconds;
+            other.cycles += double(counts.report.cycles);
         }
         const std::clock_t start = std::clock();
         const btScalar result = btSequentialImpulseConstraintSolver::solveGroup(
             bodies, numBodies, manifolds, numManifolds, constraints, numConstraints, info, debugDrawer,
             dispatcher);
-        if (beside) ownSeconds.push_back(since(start));
+        if (measures) ownSeconds.push_back(since(start));
         return result;
     }
 
@@ -76,9 +87,6 @@ private:
             }
         }
     };
-    static double since(std::clock_t start) { return double(std::clock() - start) / CLOCKS_PER_SEC; }
-
-    ZynqPgsSolver &m_other;
 };
 
 double medianMs(std::vector<double> seconds) {
@@ -87,13 +95,11 @@ double medianMs(std::vector<double> seconds) {
     return 1e3 * seconds[seconds.size() / 2];
 }
 
-void timeCubes(Table &table, int edge) {
-    ZynqPgsOptions options;
-    options.pointsPerCollision = table.settings().points;
-    ZynqPgsSolver board(table.settings().board.c_str(), options);
-    Shadow shadow(board);
-    World world(shadow, table.iterations(10));
-    // One group of all islands, so that both solvers get the step at once.
+// Jumbled cubes, `edge` along each side, fall for a while; the solvers beside then take STEPS steps.
+const int STEPS = 20;
+void runCubes(Shadow &shadow, int edge, int iterations) {
+    World world(shadow, iterations);
+    // One group of all islands, so that all solvers get the step at once.
     world.bullet().getSolverInfo().m_minimumSolverBatchSize = 1 << 30;
     world.addGround();
     std::mt19937 random(1);
@@ -106,24 +112,61 @@ void timeCubes(Table &table, int edge) {
         world.add(world.cube(), 1, at, 0.5f, turn)->setActivationState(DISABLE_DEACTIVATION);
     }
     world.step(150);
-    shadow.beside = true;
-    const int steps = 20;
-    world.step(steps);
+    shadow.measures = true;
+    world.step(STEPS);
+}
 
-    const ZynqPgsCounts &counts = board.counts();
-    const std::string bodies = std::to_string(edge * edge * edge) + " cubes: ";
-    if (counts.fallbackSteps > 0) {
-        const double untaken = double(counts.fallbackSteps);
-        table.add(NONE, untaken, bodies + "steps that the board did not take", "", within(0, 0));
-    }
-    table.add(NONE, double(counts.collisions), bodies + "collisions of the last step", "");
-    table.add(medianMs(shadow.ownSeconds), medianMs(shadow.otherSeconds), bodies + "solver, processor time",
-              "ms");
-    table.add(NONE, medianMs(shadow.otherHostSeconds), bodies + "part of it in the adapter", "ms");
-    table.add(NONE, 1e3 * shadow.boardSeconds / steps, bodies + "the board's own time (modelled)", "ms");
+// A row if the board did not take every step.
+void addUntaken(Table &table, const ZynqPgsSolver &board, const std::string &scene) {
+    const uint64_t untaken = board.counts().fallbackSteps;
+    if (untaken == 0) return;
+    table.add(NONE, double(untaken), scene + "steps that the board did not take", "", within(0, 0));
+}
+
+void timeCubes(Table &table, int edge) {
+    const Settings &settings = table.settings();
+    ZynqPgsSolver board(settings.board.c_str(), settings.solver);
+    Shadow shadow;
+    shadow.others.push_back({board, {}, {}});
+    runCubes(shadow, edge, table.iterations(10));
+
+    const Beside &other = shadow.others[0];
+    const std::string cubes = std::to_string(edge * edge * edge) + " cubes: ";
+    addUntaken(table, board, cubes);
+    table.add(NONE, double(board.counts().collisions), cubes + "collisions of the last step", "");
+    table.add(medianMs(shadow.ownSeconds), medianMs(other.seconds), cubes + "solver, processor time", "ms");
+    table.add(NONE, medianMs(other.hostSeconds), cubes + "part of it in the adapter", "ms");
+    table.add(NONE, 1e3 * other.boardSeconds / STEPS, cubes + "the board's own time (modelled)", "ms");
+}
+
+void warmCubes(Table &table, int ownIterations) {
+    const Settings &settings = table.settings();
+    ZynqPgsOptions cold = settings.solver, warm = settings.solver;
+    cold.warmStart = false;
+    warm.warmStart = true;
+    ZynqPgsSolver coldBoard(settings.board.c_str(), cold), warmBoard(settings.board.c_str(), warm);
+    Shadow shadow;
+    shadow.others.push_back({coldBoard, {}, {}});
+    shadow.others.push_back({warmBoard, {}, {}});
+    const int iterations = table.iterations(ownIterations);
+    runCubes(shadow, 10, iterations);
+
+    const std::string passes = std::to_string(iterations) + " + " + std::to_string(iterations) + " passes: ";
+    addUntaken(table, coldBoard, passes);
+    addUntaken(table, warmBoard, passes);
+    const double without = shadow.others[0].cycles / STEPS, with = shadow.others[1].cycles / STEPS;
+    table.add(NONE, without, passes + "cycles of a step without impulses", "");
+    table.add(NONE, with, passes + "cycles of a step with impulses", "");
+    table.add(NONE, with / without, passes + "ratio of the two", "");
+    if (warmBoard.counts().warmSteps == 0) table.add(NONE, NONE, passes + "this board takes no impulses", "");
 }
 
 }  // namespace
+
+void warmth(Table &table) {
+    warmCubes(table, 4);
+    warmCubes(table, 10);
+}
 
 void timing(Table &table) {
     timeCubes(table, 10);

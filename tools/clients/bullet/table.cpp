@@ -47,10 +47,10 @@ Table::Both Table::measure(int ownIterations, const std::function<std::vector<do
                            bool expectFallback) {
     Both both;
     {
-        World world("", m_settings.points, iterations(ownIterations));
+        World world("", m_settings.solver, iterations(ownIterations));
         both.bullet = scene(world);
     }
-    World world(m_settings.board, m_settings.points, iterations(ownIterations));
+    World world(m_settings.board, m_settings.solver, iterations(ownIterations));
     both.board = scene(world);
     const ZynqPgsSolver &board = *world.board();
     if (board.counts().fallbackSteps > 0 && !expectFallback) {
@@ -74,8 +74,8 @@ void Table::add(double bullet, double board, const std::string &measure, const s
 std::string Table::verdict(const Row &row) const {
     if (!row.limit.isSet()) return "";
     if (row.limit.holds(row.board)) return "ok";
-    if (row.limit.needsWarmStart) return "needs warm start";
-    return m_settings.iterations > 0 ? "other iterations" : "FAILS";
+    if (row.limit.chaotic) return "no; chaotic";
+    return m_settings.areOwn() ? "FAILS" : "no; other settings";
 }
 
 bool Table::failed() const {

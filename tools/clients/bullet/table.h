@@ -15,8 +15,8 @@ const double NONE = std::numeric_limits<double>::quiet_NaN();
 struct Limit {
     double low = -std::numeric_limits<double>::infinity();
     double high = std::numeric_limits<double>::infinity();
-    // The board cannot meet it from a cold start: it is shown and does not fail.
-    bool needsWarmStart = false;
+    // Chance decides whether it holds: it is shown and does not fail.
+    bool chaotic = false;
 
     bool isSet() const { return std::isfinite(low) || std::isfinite(high); }
     bool holds(double value) const { return value >= low && value <= high; }
@@ -24,8 +24,8 @@ struct Limit {
 inline Limit atMost(double high) { return {-std::numeric_limits<double>::infinity(), high, false}; }
 inline Limit atLeast(double low) { return {low, std::numeric_limits<double>::infinity(), false}; }
 inline Limit within(double low, double high) { return {low, high, false}; }
-inline Limit warm(Limit limit) {
-    limit.needsWarmStart = true;
+inline Limit chaotic(Limit limit) {
+    limit.chaotic = true;
     return limit;
 }
 
@@ -53,7 +53,8 @@ public:
     Both measure(int ownIterations, const std::function<std::vector<double>(World &)> &scene,
                  bool expectFallback = false);
 
-    // One row: measure `index` of `both`. A limit counts at the scene's own number of passes only.
+    // One row: measure `index` of `both`. A limit counts with the settings that the scene has without
+    // options.
     void add(const Both &both, size_t index, const std::string &measure, const std::string &unit,
              Limit limit = Limit());
     void add(double bullet, double board, const std::string &measure, const std::string &unit,
@@ -82,8 +83,8 @@ struct Scene {
 const std::vector<Scene> &scenes();
 
 // In scenes_*.cpp.
-void pile(Table &), wall(Table &), mixed(Table &), tower(Table &), ratio(Table &);
+void pile(Table &), wall(Table &), mixed(Table &), tower(Table &), ratio(Table &), spread(Table &);
 void ramp(Table &), groove(Table &), spin(Table &);
 void platform(Table &), restitution(Table &), mesh(Table &), sleeping(Table &), ccd(Table &);
 void joints(Table &), masses(Table &);
-void timing(Table &);
+void warmth(Table &), timing(Table &);

@@ -6,13 +6,11 @@ namespace {
 const btScalar TIME_STEP = btScalar(1) / 60;
 }
 
-World::World(const std::string &board, int points, int iterations) {
+World::World(const std::string &board, const ZynqPgsOptions &options, int iterations) {
     if (board.empty()) {
         m_own.reset(new btSequentialImpulseConstraintSolver);
         build(m_own.get(), iterations);
     } else {
-        ZynqPgsOptions options;
-        options.pointsPerCollision = points;
         m_board.reset(new ZynqPgsSolver(board.c_str(), options));
         build(m_board.get(), iterations);
     }

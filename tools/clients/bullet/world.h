@@ -13,13 +13,20 @@
 struct Settings {
     std::string board = "emulated:float,world";
     int iterations = 0;  // 0: each scene's own
-    int points = 4;      // of a collision, at most
+    ZynqPgsOptions solver;
+
+    // False if an option makes the limits void.
+    bool areOwn() const {
+        const ZynqPgsOptions own;
+        return iterations == 0 && solver.pointsPerCollision == own.pointsPerCollision &&
+               solver.reverseEvery == own.reverseEvery && solver.warmStart == own.warmStart;
+    }
 };
 
 class World {
 public:
     // `board` empty: Bullet's own solver.
-    World(const std::string &board, int points, int iterations);
+    World(const std::string &board, const ZynqPgsOptions &options, int iterations);
     // On a solver of the caller's, which outlives the world.
     World(btConstraintSolver &solver, int iterations);
     ~World();

@@ -79,6 +79,7 @@ void ZynqPgsGather::clearGathered() {
     m_collisions.clear();
     m_points.clear();
     m_frictions.clear();
+    m_impulses.clear();
     m_hasKinematic = false;
 }
 
@@ -111,6 +112,12 @@ bool ZynqPgsGather::gather(const btContactSolverInfo &info) {
     clearShapes();
     clearGathered();
     return !fresh && gather(info);
+}
+
+void ZynqPgsGather::reverse() {
+    std::reverse(m_collisions.begin(), m_collisions.end());
+    std::reverse(m_points.begin(), m_points.end());
+    std::reverse(m_frictions.begin(), m_frictions.end());
 }
 
 void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactSolverInfo &info) {
@@ -236,5 +243,36 @@ void ZynqPgsGather::writeVelocities(const btContactSolverInfo &info) {
         btVector3 linear, angular;
         velocitiesWithForces(*body, info, linear, angular);
         write(body, linear, angular);
+    }
+}
+
+// The tangential impulses of a collision are in m_appliedImpulseLateral1 and 2 of its points, an equal share
+// in each and along the board's tangents. A point that goes takes its share along, and one that joins another
+// collision brings it there. The tangents turn with the normal; where they jump, the passes put right what one
+// step begins with.
+void ZynqPgsGather::loadImpulses(float factor, bool withFriction) {
+    m_impulses.assign(m_collisions.size(), zpgs_impulses());
+    for (size_t at = 0; at < m_collisions.size(); at++) {
+        zpgs_impulses &impulses = m_impulses[at];
+        for (uint32_t i = 0; i < m_collisions[at].count; i++) {
+            const btManifoldPoint &point = *m_points[at][i];
+            impulses.normal[i] = factor * float(point.m_appliedImpulse);
+            if (!withFriction) continue;
+            impulses.friction[0] += factor * float(point.m_appliedImpulseLateral1);
+            impulses.friction[1] += factor * float(point.m_appliedImpulseLateral2);
+        }
+    }
+}
+
+void ZynqPgsGather::storeImpulses() {
+    for (size_t at = 0; at < m_points.size(); at++) {
+        const Points &points = m_points[at];
+        const auto last = std::find(points.begin(), points.end(), nullptr);
+        const btScalar share = btScalar(1) / btScalar(last - points.begin());
+        for (auto point = points.begin(); point != last; ++point) {
+            (*point)->m_appliedImpulse = m_impulses[at].normal[point - points.begin()];
+            (*point)->m_appliedImpulseLateral1 = m_impulses[at].friction[0] * share;
+            (*point)->m_appliedImpulseLateral2 = m_impulses[at].friction[1] * share;
+        }
     }
 }

@@ -17,9 +17,6 @@ public:
         float linearVelocity[3], angularVelocity[3];
         uint32_t shape;
     };
-    // Bullet's points of a collision: element i is that of contact i; the rest is null.
-    using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
-
     explicit ZynqPgsGather(int pointsPerCollision) : m_pointsPerCollision(pointsPerCollision) {}
 
     // Forgets the step, but not the shapes.
@@ -31,6 +28,13 @@ public:
     bool gather(const btContactSolverInfo &info);
     // Gives every body taken its velocity: that in bodies(), or by its forces if it is in no collision.
     void writeVelocities(const btContactSolverInfo &info);
+    // Puts the collisions in reverse order.
+    void reverse();
+    // Makes impulses() of those in Bullet's points, times `factor`; without friction where those are not the
+    // board's. Before the friction goes into the collisions' counts.
+    void loadImpulses(float factor, bool withFriction);
+    // Stores impulses() in Bullet's points.
+    void storeImpulses();
 
     // The bodies and manifolds taken.
     std::vector<btCollisionObject *> &takenBodies() { return m_takenBodies; }
@@ -39,8 +43,8 @@ public:
     // What goes to the board. A body that no collision names does not.
     std::vector<Body> &bodies() { return m_bodies; }
     std::vector<zpgs_collision> &collisions() { return m_collisions; }
-    const std::vector<Points> &points() const { return m_points; }       // parallel to collisions()
     const std::vector<float> &frictions() const { return m_frictions; }  // parallel to collisions()
+    std::vector<zpgs_impulses> &impulses() { return m_impulses; }        // parallel to collisions()
     // True if a kinematic body in a collision moves.
     bool hasKinematic() const { return m_hasKinematic; }
     const std::vector<zpgs_shape> &shapes() const { return m_shapes; }
@@ -56,6 +60,9 @@ private:
     void clearGathered();
     void clearShapes();
 
+    // Bullet's points of a collision: element i is that of contact i; the rest is null.
+    using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
+
     const int m_pointsPerCollision;
     std::vector<btCollisionObject *> m_takenBodies;
     std::vector<btPersistentManifold *> m_takenManifolds;
@@ -66,6 +73,7 @@ private:
     std::vector<zpgs_collision> m_collisions;
     std::vector<Points> m_points;
     std::vector<float> m_frictions;
+    std::vector<zpgs_impulses> m_impulses;
     bool m_hasKinematic = false;
 
     // The table stays from step to step, so that the board seldom gets a new one.

@@ -24,6 +24,7 @@ ZynqPgsSolver::~ZynqPgsSolver() { zpgs_close(m_board); }
 
 bool ZynqPgsSolver::open() {
     m_hasShapes = false;
+    m_boardImpulses = Impulses::Unknown;
     return !failed(zpgs_open(m_boardText.c_str(), &m_board));
 }
 
@@ -107,7 +108,7 @@ void ZynqPgsSolver::setParameters(const btContactSolverInfo &info, zpgs_paramete
         if (other != frictions[0]) parameters.pair_friction = 1;
 }
 
-// False if the board did not solve the step. The bodies and Bullet's points are then as before.
+// False if the board did not solve the step. Bullet's bodies and points are then as before.
 bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     if (m_reopen) {
         m_reopen = false;
@@ -130,6 +131,10 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     bodies.angular_velocities = column(first.angularVelocity);
     bodies.shapes = {&first.shape, sizeof first};
 
+    // A pass favours its last collisions; the same ones in every step let a tower lean.
+    const int every = m_options.reverseEvery;
+    if (every > 0 && ++m_steps % uint64_t(every) == 0) m_gather.reverse();
+    loadImpulses(info, parameters);
     std::vector<zpgs_collision> &pairs = m_gather.collisions();
     size_t points = 0;
     for (size_t i = 0; i < pairs.size(); i++) {
@@ -141,43 +146,59 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     collisions.size = sizeof collisions;
     collisions.count = pairs.size();
     collisions.collisions = {pairs.data(), sizeof pairs[0]};
+    collisions.impulses = {m_gather.impulses().data(), sizeof(zpgs_impulses)};
 
     zpgs_report report = {};
     report.size = sizeof report;
     const std::clock_t start = std::clock();
-    const zpgs_status status = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    zpgs_status status = step(bodies, collisions, parameters, report);
+    std::vector<zpgs_impulses> &impulses = m_gather.impulses();
+    if (!parameters.impulses_out)
+        impulses.assign(pairs.size(), zpgs_impulses());
+    else if (status == ZPGS_STATUS_OK)
+        status = zpgs_read_impulses(m_board, {impulses.data(), sizeof impulses[0]}, impulses.size());
     m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
     if (failed(status)) return false;
     m_counts.boardSteps++;
+    m_counts.warmSteps += parameters.warm_start;
     m_counts.bodies = all.size();
     m_counts.collisions = pairs.size();
     m_counts.points = points;
     m_counts.report = report;
-    exchangeImpulses();
+    m_gather.storeImpulses();
+    m_frictionIsBoards = true;
     return true;
 }
 
-// ==== The place for a warm start ====
-// The interface has no impulses yet: every step starts from 0, and Bullet must not find old ones when it
-// takes over an island. When a step takes and returns impulses, in an array parallel to the collisions:
-// - before zpgs_step, normal impulse i of collision k is points()[k][i]->m_appliedImpulse times
-//   info.m_warmstartingFactor, or 0 without SOLVER_USE_WARMSTARTING. The two tangential impulses of
-//   collision k are m_appliedImpulseLateral1 and m_appliedImpulseLateral2 of points()[k][0];
-// - after it, here, the same fields take what comes back. Bullet keeps them for a point that persists. Its
-//   own solver has other tangents than the board, so the tangential ones become 0 where the solver changes.
-// ====
-void ZynqPgsSolver::exchangeImpulses() {
-    for (const ZynqPgsGather::Points &points : m_gather.points())
-        for (btManifoldPoint *point : points) {
-            if (!point) break;
-            point->m_appliedImpulse = 0;
-            point->m_appliedImpulseLateral1 = 0;
-            point->m_appliedImpulseLateral2 = 0;
-        }
+// Fetches the impulses that the step begins with. The board gives impulses out even if it takes none: a
+// program may read them in Bullet's points.
+void ZynqPgsSolver::loadImpulses(const btContactSolverInfo &info, zpgs_parameters &parameters) {
+    const bool has = m_options.warmStart && m_boardImpulses != Impulses::Lacks;
+    const bool warm = has && (info.m_solverMode & SOLVER_USE_WARMSTARTING);
+    parameters.warm_start = warm;
+    parameters.impulses_out = has;
+    m_gather.loadImpulses(warm ? float(info.m_warmstartingFactor) : 0.0f, m_frictionIsBoards);
+}
+
+// A step, warm if it is asked for and the board can. A board without impulses refuses such a step before
+// anything is sent, and takes it without them.
+zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions, zpgs_parameters &parameters,
+                                zpgs_report &report) {
+    const bool asked = parameters.impulses_out != 0;
+    const zpgs_status status = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    if (status == ZPGS_STATUS_OK && asked) m_boardImpulses = Impulses::Has;
+    if (status != ZPGS_STATUS_INPUT || !asked || m_boardImpulses == Impulses::Has) return status;
+
+    parameters.warm_start = 0;
+    parameters.impulses_out = 0;
+    const zpgs_status cold = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    if (cold == ZPGS_STATUS_OK) m_boardImpulses = Impulses::Lacks;
+    return cold;
 }
 
 void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {
     m_counts.fallbackSteps++;
+    m_frictionIsBoards = false;
     std::vector<btCollisionObject *> &bodies = m_gather.takenBodies();
     std::vector<btPersistentManifold *> &manifolds = m_gather.takenManifolds();
     btSequentialImpulseConstraintSolver::solveGroup(bodies.data(), int(bodies.size()), manifolds.data(),

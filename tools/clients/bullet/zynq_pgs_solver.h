@@ -21,11 +21,18 @@ struct ZynqPgsOptions {
     int contactIterations = 0;
     int frictionIterations = 0;
     // Largest number of points of a collision, 1 to 4. The board applies the friction of a collision at the
-    // centre of its points. One place cannot resist a twist about the normal, two places can. With 2 a face
-    // that rests on four points has two places; the step then has up to twice as many collisions.
-    int pointsPerCollision = 4;
+    // centre of its points. One place cannot resist a twist about the normal, two places can: with 2 a face
+    // that rests on four points has two. With 4 the step has down to half as many collisions, and piles and
+    // towers are less stable.
+    int pointsPerCollision = 2;
+    // Every so many steps the collisions go to the library in reverse order; 0 is never. Towers lean less.
+    int reverseEvery = 3;
     // One of zpgs_order.
     uint32_t order = ZPGS_ORDER_AUTOMATIC;
+    // A step begins with the impulses of the last one if the world's solver mode says so
+    // (SOLVER_USE_WARMSTARTING, which is Bullet's default), and stores its own in Bullet's points. Costs a
+    // pass of each kind. A board without impulses does without.
+    bool warmStart = true;
     // Repetitions of a step that failed on the board, before Bullet's solver takes it.
     uint32_t retries = 1;
 };
@@ -34,6 +41,8 @@ struct ZynqPgsCounts {
     // Steps that the board solved, and steps that Bullet's solver took over from it.
     uint64_t boardSteps = 0;
     uint64_t fallbackSteps = 0;
+    // Of those on the board, the steps that began with impulses.
+    uint64_t warmSteps = 0;
     // Groups of islands with joints, which are Bullet's without a fault.
     uint64_t jointGroups = 0;
     // Of the last step on the board.
@@ -70,7 +79,9 @@ private:
     bool loadShapes();
     void setParameters(const btContactSolverInfo &info, zpgs_parameters &parameters) const;
     bool stepBoard(const btContactSolverInfo &info);
-    void exchangeImpulses();
+    void loadImpulses(const btContactSolverInfo &info, zpgs_parameters &parameters);
+    zpgs_status step(zpgs_bodies &bodies, zpgs_collisions &collisions, zpgs_parameters &parameters,
+                     zpgs_report &report);
     void fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer);
     bool failed(zpgs_status status);
     void say(const std::string &error);
@@ -79,6 +90,11 @@ private:
     const ZynqPgsOptions m_options;
     zpgs_accelerator *m_board = nullptr;
     bool m_reopen = false;
+    // Whether the board takes and gives impulses, once it is known.
+    enum class Impulses { Unknown, Has, Lacks } m_boardImpulses = Impulses::Unknown;
+    // The tangential impulses of Bullet's points are along the board's tangents, not Bullet's.
+    bool m_frictionIsBoards = false;
+    uint64_t m_steps = 0;
     ZynqPgsGather m_gather;
     // The shapes that the board has.
     bool m_hasShapes = false;
