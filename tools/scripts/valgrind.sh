@@ -17,8 +17,38 @@ check() {
 	attend timeout "${VALGRIND_LIMIT:-600}" valgrind --quiet --error-exitcode=1 --exit-on-first-error=yes \
 		--undef-value-errors=no --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite "$@"
 }
+# A C program over the shared library, installed and linked as docs/c.md says.
+check_c() {
+	local prefix abi found
+	prefix=$(mktemp -d)
+	litter+=("$prefix")
+	cargo build --release --locked --quiet -p zynq-pgs-c
+	abi=$(sed -n 's/^#define ZPGS_ABI_VERSION //p' tools/capi/include/zynq_pgs.h)
+	install -D -m 644 tools/capi/include/zynq_pgs.h "$prefix/include/zynq_pgs.h"
+	install -D -m 755 "$target_root/release/libzynq_pgs_c.so" "$prefix/lib/libzynq_pgs_c.so.$abi"
+	ln -s "libzynq_pgs_c.so.$abi" "$prefix/lib/libzynq_pgs_c.so"
+	mkdir -p "$prefix/lib/pkgconfig"
+	sed "s|@prefix@|$prefix|; s|@version@|0|" tools/capi/zynq-pgs.pc.in > "$prefix/lib/pkgconfig/zynq-pgs.pc"
+	# shellcheck disable=SC2046 # several words
+	cc -std=c99 -O1 -g tools/capi/examples/cube.c -o "$prefix/cube" \
+		$(PKG_CONFIG_PATH=$prefix/lib/pkgconfig pkg-config --cflags --libs zynq-pgs)
+	found=$(LD_LIBRARY_PATH=$prefix/lib check "$prefix/cube")
+	[ "$found" = "$(LD_LIBRARY_PATH=$prefix/lib "$prefix/cube")" ] || fail "the C example differs under memcheck"
+	echo "memcheck: nothing found in the C example, ${found##*digest}"
+}
+
 pgs=$target_root/release/pgs
 for profile in naive float half mixed windowed windowed16; do
 	check "$pgs" run --board emulated --profile "$profile" --grid 2x2x2 --steps 2 >/dev/null
 	echo "memcheck: nothing found in 2 steps on $profile"
 done
+for profile in naive float; do
+	check "$pgs" run --board emulated --profile "$profile" --scene shapes --inertia world --pair-friction --warm-start \
+		--grid 2x2x2 --steps 2 >/dev/null
+	echo "memcheck: nothing found in 2 steps with impulses on $profile"
+done
+if command -v cc >/dev/null && command -v pkg-config >/dev/null; then
+	check_c
+else
+	echo "skipped: the C example under memcheck (cc or pkg-config is not installed)"
+fi

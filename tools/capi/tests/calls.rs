@@ -235,7 +235,7 @@ fn submit_and_wait_are_a_step_and_one_step_is_in_flight() {
     assert_eq!(open.submit(&arrays(&mut crates), &all), Status::Ok, "and closed in flight");
 }
 
-/// The impulses of two steps of the driver, the second of which begins with those of the first.
+/// The impulses that come out of two steps of the driver. The second begins with the impulses of the first.
 fn warm_steps(parameters: &StepParameters) -> [zynq_pgs::Impulses; 2] {
     let mut board =
         Accelerator::open(OpenOptions::emulated("float").expect("a build")).expect("open");
