@@ -32,7 +32,7 @@ impl Interlock {
             interval: capabilities.initiation_interval.into(),
             per_issue: usize::try_from(capabilities.collisions_per_issue.max(1)).unwrap_or(1),
             windows: [contact.window.into(), friction.window.into()],
-            passes: [parameters.contact_iterations.into(), parameters.friction_iterations.into()],
+            passes: [parameters.passes().contact.into(), parameters.passes().friction.into()],
         }
     }
 

@@ -63,7 +63,7 @@ impl ContactMemory {
     }
 
     /// Takes the collisions of a step and the impulses that came out of it, in place of the ones of the
-    /// step before. A collision without impulses is forgotten.
+    /// step before. Collisions beyond the end of `impulses` are forgotten.
     pub fn remember<C: Collisions + ?Sized>(&mut self, collisions: &C, impulses: &[Impulses]) {
         self.kept.clear();
         for (index, impulses) in (0..collisions.len()).zip(impulses) {
@@ -81,13 +81,14 @@ impl ContactMemory {
     /// `factor`.
     #[must_use]
     pub fn recall<C: Collisions + ?Sized>(&self, collisions: &C, factor: f32) -> Vec<Impulses> {
+        let mut left: Vec<Left> = self.kept.iter().map(Left::of).collect();
         (0..collisions.len())
-            .map(|index| self.found(&collisions.collision(index)).scaled(factor))
+            .map(|index| self.found(&collisions.collision(index), &mut left).scaled(factor))
             .collect()
     }
 
-    /// The impulses of a collision that it remembers.
-    fn found(&self, collision: &Collision) -> Impulses {
+    /// The impulses of a collision that it remembers, which it takes out of what is `left`.
+    fn found(&self, collision: &Collision, left: &mut [Left]) -> Impulses {
         let mut found = Impulses::ZERO;
         if collision.is_empty() {
             return found;
@@ -95,29 +96,42 @@ impl ContactMemory {
         let pair = pair_of(collision);
         let begin = self.kept.partition_point(|kept| kept.pair < pair);
         let end = self.kept.partition_point(|kept| kept.pair <= pair);
-        let mut taken = [[false; CONTACT_POINTS]; 4];
-        let mut friction_of = None;
+        let mut nearest = None;
         for (contact, to) in points(collision).iter().zip(&mut found.normal) {
-            let all = self.kept[begin..end].iter().enumerate().flat_map(|(at, kept)| {
-                points(&kept.collision).iter().enumerate().map(move |(i, old)| (at, i, old, kept))
-            });
+            let all = (begin..end).flat_map(|at| (0..CONTACT_POINTS).map(move |i| (at, i)));
             let near = all
-                .filter(|(at, i, ..)| !taken.get(*at).is_some_and(|of| of[*i]))
-                .map(|(at, i, old, kept)| (distance(contact.point, old.point), at, i, kept))
+                .filter(|(at, i)| left[*at].points[*i])
+                .map(|(at, i)| {
+                    let old = &self.kept[at].collision.contacts[i];
+                    (distance(contact.point, old.point), at, i)
+                })
                 .filter(|(distance, ..)| *distance <= self.reach)
                 .min_by(|(a, ..), (b, ..)| a.total_cmp(b));
-            if let Some((_, at, i, kept)) = near {
-                *to = kept.impulses.normal[i];
-                if let Some(of) = taken.get_mut(at) {
-                    of[i] = true;
-                }
-                friction_of.get_or_insert(kept);
+            if let Some((_, at, i)) = near {
+                *to = self.kept[at].impulses.normal[i];
+                left[at].points[i] = false;
+                nearest.get_or_insert(at);
             }
         }
-        if let Some(kept) = friction_of {
-            found.friction = turned(kept, collision);
+        if let Some(at) = nearest.filter(|at| left[*at].friction) {
+            left[at].friction = false;
+            found.friction = turned(&self.kept[at], collision);
         }
         found
+    }
+}
+
+/// The parts of a collision of the last step that no collision has taken yet.
+#[derive(Debug, Clone, Copy)]
+struct Left {
+    points: [bool; CONTACT_POINTS],
+    friction: bool,
+}
+
+impl Left {
+    fn of(kept: &Kept) -> Self {
+        let count = points(&kept.collision).len();
+        Self { points: std::array::from_fn(|i| i < count), friction: true }
     }
 }
 
@@ -191,6 +205,13 @@ mod tests {
             panic!("one collision")
         };
         assert_eq!(found.normal.map(f32::to_bits), [3.0, 0.0, 0.0, 0.0].map(f32::to_bits));
+        // A manifold of two points may become two collisions of one.
+        let split = CORNERS.map(|corner| collision([2, 7], &[corner, CORNERS[0]]));
+        let found = remembers().recall(&split[..], 1.0);
+        let normals = found.iter().map(|of| of.normal.map(f32::to_bits));
+        let expected = [[3.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0]].map(|of| of.map(f32::to_bits));
+        assert!(normals.eq(expected), "{found:?}");
+        assert!(found[0].friction != [0.0; 2] && found[1].friction == [0.0; 2], "{found:?}");
     }
 
     #[test]

@@ -25,9 +25,14 @@ impl ImpulsesOut {
         given: usize,
         collision_of: impl Fn(usize) -> Option<usize>,
     ) -> (u32, Option<usize>) {
+        if !plan.passes.impulses_out {
+            return (0, None);
+        }
         self.staged.clear();
         self.staged.resize(given, Impulses::ZERO);
-        let (mut sum, mut broken) = (0_u32, None);
+        // The two change places when the step is committed: the next one then allocates nothing.
+        self.committed.reserve(given.saturating_sub(self.committed.len()));
+        let (mut sum, mut broken) = (0_u32, None::<usize>);
         let contact = if plan.passes.contact > 0 { plan.collisions } else { 0 };
         for (place, beat) in beats.iter().enumerate() {
             sum = beat.0.into_iter().fold(sum, u32::wrapping_add);
@@ -42,14 +47,14 @@ impl ImpulsesOut {
                 true => impulses.normal = words,
                 false => impulses.friction = [first, second],
             }
-            if broken.is_none() && !impulses.are_finite() {
-                broken = Some(collision);
+            if !impulses.are_finite() {
+                broken = Some(broken.map_or(collision, |first| first.min(collision)));
             }
         }
         (sum, broken)
     }
 
-    /// Makes the impulses that were read those of the last step.
+    /// Publishes the impulses that were read.
     pub(super) fn commit(&mut self) {
         std::mem::swap(&mut self.committed, &mut self.staged);
     }

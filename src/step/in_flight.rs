@@ -147,8 +147,8 @@ impl<'a> InFlight<'a> {
         let of_impulses = impulses_of(&device.s2mm, plan, *bank);
         let (impulse_sum, broken) = impulses.read(plan, of_impulses, *given, collision_of);
         // A step that was not started has no sums.
-        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum.wrapping_sub(impulse_sum));
-        read(device, staged, (plan, *bank), bodies, lives, sent_sum)?;
+        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum);
+        read(device, staged, (plan, *bank), bodies, lives, (sent_sum, impulse_sum))?;
         if let Some(collision) = broken {
             return Err(Fault::ImpulseNotFinite { collision });
         }

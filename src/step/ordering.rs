@@ -95,8 +95,7 @@ impl Ordering {
         let window = IssueWindow::of(context.capabilities, parameters)?;
         let mut input = self.buffers.gather(bodies, collisions, context.shapes);
         let empty = input.pairs.len() - input.collisions();
-        let passes = parameters.contact_iterations.saturating_add(parameters.friction_iterations);
-        if design.is_some() && passes == 0 {
+        if design.is_some() && parameters.passes().total() == 0 {
             // Without a pass the board takes no collisions.
             input.pairs = &[];
         }

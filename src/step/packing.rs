@@ -84,12 +84,15 @@ impl Device {
         let (collisions, mut seen) =
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
         seen.good &= bodies_passed;
-        let warm = warm.map_or(WarmSums::default(), |(channel, segments)| {
+        let warm = warm.map(|(channel, segments)| {
             let layout = Segment::WarmCollisions.layout(&plan.variant);
             let entries = (of_entries.collisions, of_entries.count);
-            pack_warm(&layout, channel, self.ends.ends(), entries, segments)
+            let warm = pack_warm(&layout, channel, self.ends.ends(), entries, segments);
+            // The caller's collisions must answer as they did when they were screened.
+            seen.good &= !warm.broken && warm.records == collisions;
+            warm
         });
-        seen.good &= !warm.broken;
+        let warm = warm.unwrap_or_default();
         (SentSums { velocities, collisions, warm, poses }, seen)
     }
 

@@ -42,8 +42,8 @@ pub(super) fn check_received(
     Ok(())
 }
 
-/// Reads the results of a bank into `staged`. Compares the driver's sum of the words with
-/// `sent_sum`, the accelerator's sum of the words that it sent.
+/// Reads the results of a bank into `staged`. Compares the driver's sum of the words, with `before` for
+/// the impulses, with `sent_sum`, the accelerator's sum of the words that it sent.
 ///
 /// A board that keeps only live bodies sends the results in the order of `lives`.
 pub(super) fn read<B: Bodies + ?Sized>(
@@ -52,7 +52,7 @@ pub(super) fn read<B: Bodies + ?Sized>(
     (plan, bank): (&Plan, Bank),
     bodies: &B,
     lives: Option<&Lives>,
-    sent_sum: Option<u32>,
+    (sent_sum, before): (Option<u32>, u32),
 ) -> Result<(), Fault> {
     // A panic in the caller's code loses the memory: the next step allocates it anew.
     let mut records = std::mem::take(staged);
@@ -65,6 +65,7 @@ pub(super) fn read<B: Bodies + ?Sized>(
         None => results.read_in_order(plan.bodies, bodies, &statics[bank], &mut records, packers),
     };
     *staged = records;
+    let found = found.wrapping_add(before);
     match (sent_sum, broken) {
         (Some(expected), _) if expected != found => {
             Err(Fault::Checksum { direction: Direction::S2mm, expected, found })

@@ -70,7 +70,8 @@ pub enum InputError {
 
     /// Collisions that are written one by one have no impulses.
     #[error(
-        "collisions that are written one by one come without impulses: leave          `StepParameters::warm_start` out, or give all collisions at once (step, submit, prepare)"
+        "collisions that are written one by one come without impulses: leave \
+         `StepParameters::warm_start` out, or give all collisions at once (step, submit, prepare)"
     )]
     WrittenWarm,
 

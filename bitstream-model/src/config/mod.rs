@@ -15,7 +15,7 @@ use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
-use pgs_interface::record::BEAT_BYTES;
+use pgs_interface::record::{BEAT_BYTES, collision};
 use pgs_interface::stripe::Stripe;
 
 /// Upper limit of the beats in a group of a stripe.
@@ -399,6 +399,17 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
                 .all(|of| stripe(of, profile.mm2s_widths))
                 || !stripe(&stripes.results, profile.s2mm_widths),
             "stripes of 1 to 8 beats on streams that exist are expected",
+        ),
+        (
+            stripes.warm_collisions.is_some_and(|warm| {
+                let beats = |of: &Stripe, rows: usize| {
+                    of.streams.iter().copied().cycle().take(rows).collect::<Vec<_>>()
+                };
+                !stripe(&warm, profile.mm2s_widths)
+                    || profile.collisions_per_issue != 1
+                    || beats(&warm, collision::ROWS) != beats(&stripes.collisions, collision::ROWS)
+            }),
+            "a warm stripe that begins as the stripe of the collisions is expected",
         ),
         (profile.initiation_interval == 0, "an issue of at least one cycle is expected"),
         (profile.clock_khz == 0, "a clock of at least 1 kHz is expected"),

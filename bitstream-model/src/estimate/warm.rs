@@ -85,7 +85,7 @@ mod tests {
     const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
 
     #[test]
-    fn a_pass_of_each_kind_costs_a_fifth_of_the_cycles_and_a_third_of_the_bytes() {
+    fn a_pass_of_each_kind_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes() {
         let of = |way| WarmCost::new(&FLOAT.default_variant(), way, &THESIS_STEP);
         let own = of(WarmStart::OwnPass).expect("float has a warm start");
         assert_eq!(own.more_cycles, 2 * 254_000 + 374 + 314);

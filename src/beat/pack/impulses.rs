@@ -25,11 +25,15 @@ pub(crate) struct WarmSums {
     pub(crate) contact: u32,
     /// In the friction pass.
     pub(crate) friction: u32,
+    /// Sum of the words of the collisions' records in any other pass.
+    pub(crate) records: u32,
     /// Whether an impulse was not a number.
     pub(crate) broken: bool,
 }
 
-/// Writes the collisions of both warm passes.
+/// Writes the collisions of both warm passes, one after the other on the caller's thread. The records
+/// of the other passes are written already: the sum of the words tells whether the caller's collisions
+/// are still the same.
 ///
 /// Shape: a segment has `layout.beats_on_channel(collisions.len(), channel)` beats. Collisions are
 /// records in world coordinates and f32, a row a beat.
@@ -41,9 +45,14 @@ pub(crate) fn pack_warm<C: Collisions + ?Sized>(
     segments: WarmSegments<'_>,
 ) -> WarmSums {
     let mut sums = WarmSums::default();
-    let rows: Vec<usize> = layout.rows_on(channel).filter(|row| *row < collision::ROWS).collect();
+    let mut rows = [0; collision::ROWS];
+    let mut beats = 1;
+    for row in layout.rows_on(channel).filter(|row| *row < collision::ROWS) {
+        rows[beats - 1] = row;
+        beats += 1;
+    }
+    let rows = &rows[..beats - 1];
     let WarmSegments { contact, friction } = segments;
-    let beats = rows.len() + 1;
     let (mut contact, mut friction) =
         (contact.chunks_exact_mut(beats), friction.chunks_exact_mut(beats));
     for index in 0..count {
@@ -53,6 +62,9 @@ pub(crate) fn pack_warm<C: Collisions + ?Sized>(
         let counted = Counted::from(&of);
         let bodies = [counted.collision.body_a, counted.collision.body_b];
         let whole = record::collision::encode(counted, bodies.map(|body| ends.get(body))).whole();
+        for row in whole {
+            sums.records = row.words().into_iter().fold(sums.records, u32::wrapping_add);
+        }
         let Impulses { normal, friction: [first, second] } = impulses;
         let kinds = [
             (contact.next(), normal, &mut sums.contact),
@@ -60,7 +72,7 @@ pub(crate) fn pack_warm<C: Collisions + ?Sized>(
         ];
         for (to, impulses, sum) in kinds {
             let Some((last, others)) = to.and_then(|to| to.split_last_mut()) else { continue };
-            for (to, row) in others.iter_mut().zip(&rows) {
+            for (to, row) in others.iter_mut().zip(rows) {
                 *to = Beat(whole[*row].words());
             }
             *last = Beat(impulses.map(f32::to_bits));

@@ -36,11 +36,7 @@ pub(crate) fn call_with(
     match status {
         // The text of the accelerator is that of the other call.
         Status::Busy => last_error::set(text),
-        Status::Cancelled => {
-            handle.cancelled();
-            handle.set_text(text);
-        }
-        _ => handle.set_text(text),
+        _ => handle.note(Failure { status, text }),
     }
     status
 }

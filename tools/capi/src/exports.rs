@@ -260,8 +260,8 @@ pub unsafe extern "C" fn zpgs_wait(
 }
 
 /// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-/// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. Not while a
-/// step is in flight. For the warm start of the next step, sounds, damage.
+/// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. For the warm
+/// start of the next step, sounds, damage.
 ///
 /// # Safety
 /// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
@@ -276,7 +276,7 @@ pub unsafe extern "C" fn zpgs_read_impulses(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        let found = state.idle()?.impulses();
+        let found = state.impulses();
         if found.len() != count {
             return Err(Failure::argument(format!(
                 "found {count} as the number of impulses, but the last step with impulses_out had {} \
@@ -313,7 +313,7 @@ pub(crate) fn check_impulses(
 ) -> Result<(), Failure> {
     if parameters.warm_start && !collisions.has_impulses() {
         return Err(Failure::argument(
-            "a warm start without impulses: give those of zpgs_collisions, or leave warm_start 0"
+            "a warm start without impulses: set impulses of zpgs_collisions, or leave warm_start 0"
                 .to_owned(),
         ));
     }

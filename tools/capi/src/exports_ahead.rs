@@ -44,35 +44,55 @@ pub unsafe extern "C" fn zpgs_prepare(
 }
 
 /// Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
-/// flight: the results are read while the board works on the next step, which is then in flight.
+/// flight: the results are read while the board works on the next step.
 ///
-/// The call returns the first failure. If the step in flight has failed and the prepared one was
-/// started all the same, `zpgs_wait` ends it as any other; if none is in flight afterwards,
-/// `zpgs_wait` says so with `ZPGS_STATUS_SEQUENCE`.
+/// The status is that of the step that has ended. `started` gets the status of the start, and a step
+/// is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before: `zpgs_wait`
+/// ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started because the
+/// call was refused. `zpgs_last_error` has the text of the step that has ended or, if that is done, of
+/// the start.
+///
+/// `report` may be null.
 ///
 /// # Safety
-/// As `zpgs_step`.
+/// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during the
+/// call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_wait_and_start(
     accelerator: *mut AcceleratorHandle,
     bodies: *const BodyArrays,
     report: *mut Report,
+    started: *mut Status,
 ) -> Status {
     // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-    // returns: `# Safety` of this function.
+    // returns: `# Safety` of this function. The same holds below.
     let handle = unsafe { memory::handle(accelerator) };
-    call_with(handle, |state| {
+    let mut start_failed = None;
+    let status = call_with(handle, |state| {
+        // SAFETY: `started` is null or leads to a status that this call alone uses.
+        unsafe { memory::store(started, "status of the start", Status::Sequence) }?;
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
         // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
         // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
-        let (done, started) = state.wait_and_start(&mut bodies);
+        let (done, start) = state.wait_and_start(&mut bodies)?;
+        let status = start.as_ref().err().map_or(Status::Ok, |failure| failure.status);
+        start_failed = start.err();
+        // SAFETY: as above.
+        unsafe { memory::store(started, "status of the start", status) }?;
         let done = done?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
-        started
-    })
+        Ok(())
+    });
+    if let (Status::Ok, Some(failure)) = (status, start_failed) {
+        // SAFETY: as above.
+        if let Ok(handle) = unsafe { memory::handle(accelerator) } {
+            handle.note(failure);
+        }
+    }
+    status
 }
 
 /// Starts the prepared step, with none in flight. It may be started again, as after a fault.

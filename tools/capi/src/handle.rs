@@ -4,8 +4,8 @@ use std::ffi::{CStr, CString, c_char};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use zynq_pgs::{
-    Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, OpenOptions,
-    Prepared, StepParameters, StepReport,
+    Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, Impulses,
+    OpenOptions, Prepared, StepParameters, StepReport,
 };
 
 use crate::failure::Failure;
@@ -63,14 +63,12 @@ impl AcceleratorHandle {
         self.cancellation.cancel();
     }
 
-    /// Notes that a call has reported the cancellation.
-    pub(crate) fn cancelled(&self) {
-        self.cancellation.clear();
-    }
-
-    /// Keeps the text of a failed call.
-    pub(crate) fn set_text(&self, text: String) {
-        *self.text.lock().unwrap_or_else(PoisonError::into_inner) = c_string(text);
+    /// Keeps the text of a failure; a cancellation that is reported ends no other step.
+    pub(crate) fn note(&self, failure: Failure) {
+        if failure.status == Status::Cancelled {
+            self.cancellation.clear();
+        }
+        *self.text.lock().unwrap_or_else(PoisonError::into_inner) = c_string(failure.text);
     }
 
     /// The text of the last failed call; it stays until another call fails.
@@ -114,8 +112,8 @@ impl State {
         collisions: &impl Collisions,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
-        self.prepared = None;
         let ticket = self.ticket()?;
+        self.prepared = None;
         let mut step = self.accelerator.attach(ticket)?;
         let prepared = step.prepare(bodies, collisions, parameters);
         // The step in flight goes on, whatever became of the other.
@@ -125,23 +123,22 @@ impl State {
     }
 
     /// Ends the step in flight, and starts the prepared one: the outcome of each.
+    #[expect(clippy::type_complexity, reason = "two outcomes, or neither")]
     pub(crate) fn wait_and_start(
         &mut self,
         bodies: &mut impl Bodies,
-    ) -> (Result<StepReport, Failure>, Result<(), Failure>) {
-        let prepared = match prepared(&self.prepared) {
-            Ok(prepared) => prepared,
-            Err(failure) => return (Err(failure), Ok(())),
-        };
+    ) -> Result<(Result<StepReport, Failure>, Result<(), Failure>), Failure> {
+        let prepared = prepared(&self.prepared)?;
         let none = || Failure::sequence("no step is in flight: call zpgs_start");
-        let ticket = self.ticket.take().ok_or_else(none);
-        let step = ticket.and_then(|ticket| Ok(self.accelerator.attach(ticket)?));
-        let (done, started) = match step {
-            Ok(step) => step.wait_and_start(bodies, prepared),
-            Err(failure) => return (Err(failure), Ok(())),
-        };
+        let ticket = self.ticket.take().ok_or_else(none)?;
+        let (done, started) = self.accelerator.attach(ticket)?.wait_and_start(bodies, prepared);
         let started = started.map(|step| self.ticket = Some(step.detach()));
-        (done.map_err(Into::into), started.map_err(Into::into))
+        Ok((done.map_err(Into::into), started.map_err(Into::into)))
+    }
+
+    /// The impulses of the last step that gave them out.
+    pub(crate) fn impulses(&self) -> &[Impulses] {
+        self.accelerator.impulses()
     }
 
     /// Starts the prepared step.

@@ -295,16 +295,20 @@ fn a_step_is_prepared_while_another_is_in_flight() {
     let prepare = |bodies: &BodyArrays| {
         made!(zpgs_prepare(open.0, from_ref(bodies), from_ref(&all), from_ref(&parameters)))
     };
-    let wait_and_start =
-        |bodies: &BodyArrays| made!(zpgs_wait_and_start(open.0, from_ref(bodies), null_mut()));
+    let wait_and_start = |bodies: &BodyArrays| {
+        let mut started = Status::Panic;
+        let (report, out) = (null_mut(), &raw mut started);
+        (made!(zpgs_wait_and_start(open.0, from_ref(bodies), report, out)), started)
+    };
+    let refused = (Status::Sequence, Status::Sequence);
     assert_eq!(prepare(&arrays(&mut right)), Status::Sequence);
     assert_eq!(made!(zpgs_start(open.0)), Status::Sequence);
     assert!(open.text().contains("zpgs_prepare"), "{}", open.text());
     assert_eq!(open.submit(&arrays(&mut left), &all), Status::Ok, "{}", open.text());
-    assert_eq!(wait_and_start(&arrays(&mut left)), Status::Sequence, "nothing is prepared");
+    assert_eq!(wait_and_start(&arrays(&mut left)), refused, "nothing is prepared");
     assert_eq!(prepare(&arrays(&mut right)), Status::Ok, "{}", open.text());
     assert_eq!(made!(zpgs_start(open.0)), Status::Sequence, "a step is in flight");
-    assert_eq!(wait_and_start(&arrays(&mut left)), Status::Ok, "{}", open.text());
+    assert_eq!(wait_and_start(&arrays(&mut left)), (Status::Ok, Status::Ok), "{}", open.text());
     assert_eq!(left, stepped());
     assert_eq!(open.wait(&arrays(&mut right)), Status::Ok, "{}", open.text());
     assert_eq!(right, stepped());
@@ -313,7 +317,16 @@ fn a_step_is_prepared_while_another_is_in_flight() {
     assert_eq!(made!(zpgs_start(open.0)), Status::Ok, "{}", open.text());
     assert_eq!(open.wait(&arrays(&mut again)), Status::Ok, "{}", open.text());
     assert_eq!(again, stepped());
-    assert_eq!(wait_and_start(&arrays(&mut again)), Status::Sequence, "none is in flight");
+    assert_eq!(wait_and_start(&arrays(&mut again)), refused, "none is in flight");
+    // A start that is refused leaves the results of the step before in place.
+    let (mut left, mut right) = (world(), world());
+    assert_eq!(open.submit(&arrays(&mut left), &all), Status::Ok, "{}", open.text());
+    assert_eq!(prepare(&arrays(&mut right)), Status::Ok, "{}", open.text());
+    open.cancel();
+    let (done, started) = wait_and_start(&arrays(&mut left));
+    assert_eq!((done, started), (Status::Cancelled, Status::Cancelled), "{}", open.text());
+    assert_eq!((left, right), (world(), world()));
+    assert_eq!(open.wait(&arrays(&mut right)), Status::Sequence, "no step is in flight");
 }
 
 #[test]

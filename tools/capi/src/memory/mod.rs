@@ -11,6 +11,6 @@ mod pointer;
 mod sized;
 mod view;
 
-pub(crate) use pointer::{close, handle, open_into, slice, text};
+pub(crate) use pointer::{close, handle, open_into, slice, store, text};
 pub(crate) use sized::{Out, read};
 pub(crate) use view::{BodiesView, CollisionsView, store_impulses};

@@ -54,6 +54,20 @@ pub(crate) unsafe fn open_into(
     Ok(())
 }
 
+/// Stores a value; null does nothing.
+///
+/// # Safety
+/// `out` is null, or leads to memory for a value that no other thread reads or writes.
+pub(crate) unsafe fn store<T>(out: *mut T, name: &str, value: T) -> Result<(), Failure> {
+    if out.is_null() {
+        return Ok(());
+    }
+    let out = checked(out, name)?;
+    // SAFETY: not null and aligned, as checked; the caller promises memory for a value.
+    unsafe { out.write(value) };
+    Ok(())
+}
+
 /// Closes an accelerator; null does nothing.
 ///
 /// # Safety

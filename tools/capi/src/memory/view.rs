@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// One strided array.
 ///
 /// Invariant: for every index below the count it was made with, `first` plus the index times the
-/// stride is aligned and leads to an element that is initialised and in the caller's memory.
+/// stride is aligned and leads to an element in the caller's memory.
 #[derive(Debug)]
 struct Column<T> {
     first: NonNull<T>,
@@ -23,8 +23,8 @@ impl<T: Copy> Column<T> {
     /// Checks the address, the stride and the extent of an array.
     ///
     /// # Safety
-    /// `data` is null or leads to `count` elements, `stride` bytes apart, which are initialised and
-    /// live as long as the column is in use. Every bit pattern is a `T`.
+    /// `data` is null or leads to `count` elements, `stride` bytes apart, which live as long as the
+    /// column is in use. Every bit pattern is a `T`.
     unsafe fn new(data: StridedConst, count: usize, name: &str) -> Result<Self, Failure> {
         let StridedConst { data, stride } = data;
         if count == 0 {
@@ -58,11 +58,11 @@ impl<T: Copy> Column<T> {
     /// An element.
     ///
     /// # Safety
-    /// `index` is below the count, and no other thread writes the element.
+    /// `index` is below the count, the element is initialised, and no other thread writes it.
     unsafe fn get(&self, index: usize) -> T {
         // SAFETY: the caller promises the index.
         let element = unsafe { self.at(index) };
-        // SAFETY: aligned, initialised and in the caller's memory (the invariant); nothing writes
+        // SAFETY: aligned and in the caller's memory (the invariant), and initialised; nothing writes
         // it.
         unsafe { element.read() }
     }
@@ -101,8 +101,8 @@ impl BodiesView {
     /// Checks the arrays.
     ///
     /// # Safety
-    /// Each array is as [`BodyArrays`] describes, and lives as long as the view is in use. Nothing
-    /// but the view writes the arrays meanwhile.
+    /// Each array is as [`BodyArrays`] describes, initialised, and lives as long as the view is in use.
+    /// Nothing but the view writes the arrays meanwhile.
     pub(crate) unsafe fn new(arrays: BodyArrays) -> Result<Self, Failure> {
         let BodyArrays { count, shapes, .. } = arrays;
         let BodyArrays { positions, orientations, linear_velocities, angular_velocities, .. } =
@@ -181,8 +181,8 @@ impl CollisionsView<'_> {
     /// Checks the arrays.
     ///
     /// # Safety
-    /// The arrays are as [`CollisionArray`] describes, and live as long as the view is in use.
-    /// Nothing writes them meanwhile.
+    /// The arrays are as [`CollisionArray`] describes, initialised, and live as long as the view is in
+    /// use. Nothing writes them meanwhile.
     pub(crate) unsafe fn new(array: CollisionArray) -> Result<Self, Failure> {
         let CollisionArray { count, collisions, impulses, .. } = array;
         // SAFETY: the caller promises the array; a `Collision` takes every bit pattern.

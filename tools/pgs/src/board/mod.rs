@@ -222,7 +222,7 @@ impl OpenBoard {
             return failure;
         }
         let diverged = matches!(&error, zynq_pgs::Error::Step { fault, .. }
-            if matches!(**fault, Fault::NotFinite { .. }));
+            if matches!(**fault, Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. }));
         if diverged && self.observer.is_some() {
             // The emulated board does not miscalculate: the input numbers are too large.
             return Failure::input(error).next(

@@ -42,7 +42,7 @@ struct State {
     /// The impulses that the collisions begin with: zeros in a cold step.
     impulses: Vec<Impulses>,
     /// The impulses that come out of a step without faults, if they do.
-    impulses_after: Vec<Impulses>,
+    impulses_after: Vec<[u32; 6]>,
     /// The bits after a step without faults, and the step's time on the board's clock.
     after: Vec<[u32; 13]>,
     takes: Duration,
@@ -112,6 +112,16 @@ fn bits(bodies: &[Body]) -> Vec<[u32; 13]> {
             all
         })
         .collect()
+}
+
+/// The bits of impulses.
+fn words(impulses: &[Impulses]) -> Vec<[u32; 6]> {
+    let of = |impulses: &Impulses| {
+        let [a, b, c, d] = impulses.normal;
+        let [e, f] = impulses.friction;
+        [a, b, c, d, e, f].map(f32::to_bits)
+    };
+    impulses.iter().map(of).collect()
 }
 
 /// An emulated board, and the driver on it.
@@ -185,7 +195,7 @@ impl State {
         Ok(Self {
             shapes: scene.shapes().to_vec(),
             bodies: scene.bodies().to_vec(),
-            impulses_after: accelerator.impulses().to_vec(),
+            impulses_after: words(accelerator.impulses()),
             collisions,
             impulses,
             after: bits(&after),
@@ -231,7 +241,8 @@ impl Bench {
     pub(super) fn passes(&self) -> [u32; 2] {
         let StepParameters { contact_iterations, friction_iterations, warm_start, .. } =
             self.parameters;
-        [contact_iterations, friction_iterations].map(|count| count + u32::from(warm_start))
+        let of = |count: u32| count + u32::from(warm_start && count > 0);
+        [contact_iterations, friction_iterations].map(of)
     }
 
     pub(super) fn streams_once(&self) -> bool {
@@ -249,15 +260,16 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     let mut step = |accelerator: &mut Accelerator, state: &State| {
         let mut bodies = state.bodies.clone();
         let result = accelerator.step(&mut bodies, &state.given(), &bench.parameters);
-        (result, bits(&bodies))
+        (result, bits(&bodies), words(accelerator.impulses()))
     };
     let (small, port) = (&bench.small, board.cpu_port());
     let undisturbed =
-        matches!(step(&mut accelerator, small), (Ok(_), ref bodies) if *bodies == small.after);
+        matches!(step(&mut accelerator, small), (Ok(_), ref bodies, _) if *bodies == small.after);
+    let before = words(accelerator.impulses());
     board.inject(cell.plan.clone());
     let begin = port.now();
     let state = if cell.larger { &bench.large } else { small };
-    let (result, bodies) = step(&mut accelerator, state);
+    let (result, bodies, impulses) = step(&mut accelerator, state);
     found.elapsed = port.now().saturating_sub(begin);
     found.happened = undisturbed
         && board.faults() == cell.plan.faults.len() as u64
@@ -271,7 +283,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     let lost = match (&result, cell.expected) {
         (Ok(report), Expected::SameBits) => {
             interrupts = report.interrupts;
-            found.bodies = bodies == state.after;
+            found.bodies = bodies == state.after && impulses == state.impulses_after;
             false
         }
         (Err(error), Expected::Fails { cause, channel, aftermath }) => {
@@ -281,7 +293,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
                 && locates_fault(cell, error)
                 && error.must_reopen() == lost
                 && error.may_retry() != lost;
-            found.bodies = bodies == bits(&state.bodies);
+            found.bodies = bodies == bits(&state.bodies) && impulses == before;
             lost
         }
         (Ok(_) | Err(_), _) => false,
@@ -292,7 +304,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
         found.next &= reopen(&board).is_err();
         return found;
     }
-    let (next, bodies) = step(&mut accelerator, small);
+    let (next, bodies, impulses) = step(&mut accelerator, small);
     if let (Ok(report), true) = (&next, cell.expected == Expected::SameBits) {
         found.named = match cell.kind {
             // A single spurious interrupt can replace the real one, which then never comes.
@@ -304,7 +316,7 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
     }
     found.next = next.is_ok()
         && bodies == small.after
-        && accelerator.impulses() == small.impulses_after
+        && impulses == small.impulses_after
         && board.violations().is_empty();
     found
 }
@@ -358,9 +370,9 @@ fn reports_lost(
     step: &mut impl FnMut(
         &mut Accelerator,
         &State,
-    ) -> (Result<zynq_pgs::StepReport, Error>, Vec<[u32; 13]>),
+    ) -> (Result<zynq_pgs::StepReport, Error>, Vec<[u32; 13]>, Vec<[u32; 6]>),
 ) -> bool {
-    let (result, bodies) = step(accelerator, state);
+    let (result, bodies, _) = step(accelerator, state);
     matches!(result, Err(Error::MustReopen))
         && bodies == bits(&state.bodies)
         && matches!(accelerator.set_shapes(&state.shapes), Err(Error::MustReopen))
