@@ -194,7 +194,8 @@ impl Accelerator {
         let cycles = match deferred {
             Some(cycles) => cycles,
             None => {
-                let input = PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
+                let input =
+                    PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
                 self.solve_arrived(input)?
             }
         };

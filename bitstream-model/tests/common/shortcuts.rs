@@ -194,8 +194,13 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
             }),
         }
     };
+    let inertia = |k: u32| {
+        let of = |n: u64| unit(seed ^ 0x33, 8 * u64::from(k) + n);
+        [2.0 + of(0), 2.0 + of(1), 2.0 + of(2), of(3), of(4), of(5)]
+    };
     Step {
         shapes: vec![[0.0, 0.0], [1.0, 2.5], [0.25, 0.0]],
+        inertias: (0..bodies).map(inertia).collect(),
         time_step: 0.02,
         drift: 0.005,
         coefficient: 0.2,

@@ -3,7 +3,7 @@
 
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use pgs_interface::control;
-use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
 use proptest::prelude::*;
 
 use crate::common;
@@ -30,12 +30,11 @@ fn config() -> impl Strategy<Value = BoardConfig> {
             ][..],
         ),
         prop::option::of(prop::sample::select(&[1_u32, 3, 20, 600][..])),
+        prop::sample::select(&[Inertia::Isotropic, Inertia::World][..]),
     )
-        .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots)| BoardConfig {
-            length_width,
-            bandwidth,
-            window_slots,
-            ..board(profile, fifo_beats)
+        .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots, inertia)| {
+            let usual = board(profile, fifo_beats);
+            BoardConfig { length_width, bandwidth, window_slots, inertia, ..usual }
         })
 }
 

@@ -6,13 +6,14 @@
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
-//! `solver.rs` taking one after the other. It is for arithmetic in f32 or in binary16, with isotropic
-//! inertia and subnormals kept.
+//! `solver.rs` taking one after the other. It is for arithmetic in f32 with either form of inertia, or in
+//! binary16 with isotropic inertia, and for subnormals that are kept.
 
 mod block;
 mod convert;
 mod decode;
 mod grouping;
+mod inertia;
 mod kernel;
 mod motion;
 mod numbers;
@@ -21,6 +22,7 @@ mod queue;
 mod records;
 #[cfg(test)]
 mod tests;
+mod vector;
 mod wavefront;
 mod width;
 
@@ -28,7 +30,7 @@ use std::ops::Range;
 
 use pgs_support::Crew;
 
-use crate::accelerator::arithmetic::inertia::Isotropic;
+use crate::accelerator::arithmetic::inertia::{self as form, Isotropic, Stored, World};
 use crate::accelerator::arithmetic::number::{Format, Half, Single};
 use crate::accelerator::hazards::Entry;
 use crate::accelerator::per_record::fixed_impulse;
@@ -36,11 +38,13 @@ use crate::accelerator::records::decode::Collision;
 use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters, Velocity};
 use crate::config::THREADS_MAX;
 use pgs_interface::number::Precision;
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::CONTACT_POINTS;
 
 use block::{Block, LANES, ROWS_APART};
 use decode::{Group, PUT_OFF};
 use grouping::Places;
+use kernel::InertiaRow;
 use wavefront::{Fronts, Line, Passes};
 use width::Width;
 
@@ -73,7 +77,7 @@ impl Stage {
     }
 
     /// The pass over one collision; returns its share of the impulse sum.
-    fn solve<F: Format>(
+    fn solve<F: Format, I: form::Inertia>(
         self,
         collision: &Collision,
         parameters: &SolverParameters,
@@ -82,18 +86,35 @@ impl Stage {
         impulses: &mut Impulses,
     ) -> u64 {
         if self.contact {
-            solver::contact::<F, F, Isotropic>(
-                collision, parameters, masses, velocities, impulses, None,
-            );
+            solver::contact::<F, F, I>(collision, parameters, masses, velocities, impulses, None);
             return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
         }
         if self.turning {
             *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
         }
-        solver::friction::<F, F, Isotropic>(
-            collision, parameters, masses, velocities, impulses, None,
-        );
+        solver::friction::<F, F, I>(collision, parameters, masses, velocities, impulses, None);
         0
+    }
+}
+
+/// What the bodies of a step are like.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Properties<'a> {
+    pub(crate) shape_of: &'a [u8],
+    /// The mass properties of each shape.
+    pub(crate) masses: &'a [Mass],
+    /// With world inertia that of each body.
+    pub(crate) inertias: &'a [Stored],
+}
+
+impl Properties<'_> {
+    /// The mass properties of a body.
+    fn mass(&self, body: usize) -> Mass {
+        let mass = self.masses[usize::from(self.shape_of[body])];
+        match self.inertias.get(body) {
+            Some(inertia) => Mass { inverse_inertia: *inertia, ..mass },
+            None => mass,
+        }
     }
 }
 
@@ -109,6 +130,7 @@ pub(crate) struct Batch {
     width: Width,
     /// Precision of the arithmetic.
     precision: Precision,
+    inertia: Inertia,
     crew: Crew,
     fronts: Fronts,
     /// Whether the fronts are measured for all decoded collisions.
@@ -118,6 +140,8 @@ pub(crate) struct Batch {
     /// Number of bodies.
     bodies: usize,
     lines: Vec<Line>,
+    /// With world inertia a row for each row of the lines.
+    inertias: Vec<InertiaRow>,
     /// Whether the lines have the velocities of all bodies.
     entered: bool,
     /// Records that are put into their blocks when the threads have ended.
@@ -144,12 +168,14 @@ impl Batch {
             impulse_sum: 0,
             width,
             precision: Precision::F32,
+            inertia: Inertia::Isotropic,
             crew,
             fronts: Fronts::default(),
             measured: false,
             spins: false,
             bodies: 0,
             lines: Vec::new(),
+            inertias: Vec::new(),
             entered: false,
             put_off: Vec::with_capacity(PUT_OFF),
             pair_friction: false,
@@ -161,6 +187,11 @@ impl Batch {
         self.precision = precision;
         self.places = Places::of_issues(together);
         self
+    }
+
+    /// Sets the form of inertia: world inertia in f32 alone.
+    pub(crate) fn with_inertia(self, inertia: Inertia) -> Self {
+        Self { inertia, ..self }
     }
 
     /// Begins a step: forgets the last step's collisions and makes room for `collisions`, which with
@@ -186,7 +217,7 @@ impl Batch {
     }
 
     /// Copies the velocities of all bodies into the lines, unless they are there already.
-    pub(crate) fn enter(&mut self, velocities: &[Velocity], shape_of: &[u8], masses: &[Mass]) {
+    pub(crate) fn enter(&mut self, velocities: &[Velocity], properties: Properties<'_>) {
         if self.entered {
             return;
         }
@@ -194,6 +225,7 @@ impl Batch {
         if self.lines.len() < lines {
             self.lines.resize(lines, Line::default());
         }
+        let Properties { shape_of, masses, inertias } = properties;
         let own = &mut self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
         let rounded = self.precision == Precision::Binary16;
@@ -211,6 +243,19 @@ impl Batch {
                 }
             },
         );
+        if self.inertia == Inertia::World {
+            let rows = 2 * self.lines.len();
+            if self.inertias.len() < rows {
+                self.inertias.resize(rows, InertiaRow::default());
+            }
+            let own = &mut self.inertias[ROWS_APART as usize..];
+            let parts = inertias.chunks(COPIED_TOGETHER).zip(own.chunks_mut(COPIED_TOGETHER));
+            self.crew.each(parts, |(inertias, rows)| {
+                for (row, inertia) in rows.iter_mut().zip(inertias) {
+                    *row = inertia::row(*inertia);
+                }
+            });
+        }
         self.entered = true;
     }
 
@@ -252,8 +297,7 @@ impl Batch {
         passes: Range<u32>,
         contact: u32,
         parameters: &SolverParameters,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         velocities: &mut [Velocity],
     ) {
         if passes.is_empty() || self.places.blocks() == 0 {
@@ -263,9 +307,9 @@ impl Batch {
             self.fronts.measure(&self.places);
             self.measured = true;
         }
-        self.enter(velocities, shape_of, masses);
+        self.enter(velocities, properties);
         let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
-        let (width, precision) = (self.width, self.precision);
+        let (width, precision, inertia) = (self.width, self.precision, self.inertia);
         let rounded;
         let parameters = match precision {
             Precision::F32 => parameters,
@@ -274,9 +318,11 @@ impl Batch {
                 &rounded
             }
         };
-        let run = Passes { numbers: &passes, contact, finding, parameters, width, precision };
+        let run =
+            Passes { numbers: &passes, contact, finding, parameters, width, precision, inertia };
         let blocks = &mut self.blocks[..self.places.blocks()];
-        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.crew);
+        let (lines, inertias) = (&mut self.lines, &self.inertias);
+        let sum = self.fronts.run(run, blocks, lines, inertias, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
         let own = &self.lines[ROWS_APART as usize / 2..];
@@ -289,15 +335,13 @@ impl Batch {
     }
 
     /// Runs a part of one pass, one collision after the other in the order received.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of `run`, and the part")]
     pub(crate) fn run_part(
         &mut self,
         pass: u32,
         part: Range<usize>,
         contact: u32,
         parameters: &SolverParameters,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         velocities: &mut [Velocity],
     ) {
         let stage = Stage::new(pass, contact);
@@ -309,11 +353,12 @@ impl Batch {
             let sides = bodies.map(|body| body as usize);
             let mut pair = sides.map(|body| velocities[body]);
             let mut impulses = block.impulses(lane);
-            let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
+            let masses = sides.map(|body| properties.mass(body));
             let collision = block.collision(lane);
-            let solve = match self.precision {
-                Precision::F32 => Stage::solve::<Single>,
-                Precision::Binary16 => Stage::solve::<Half>,
+            let solve = match (self.precision, self.inertia) {
+                (Precision::F32, Inertia::Isotropic) => Stage::solve::<Single, Isotropic>,
+                (Precision::F32, Inertia::World) => Stage::solve::<Single, World>,
+                (Precision::Binary16, _) => Stage::solve::<Half, Isotropic>,
             };
             let sum = solve(stage, &collision, parameters, &masses, &mut pair, &mut impulses);
             self.impulse_sum = self.impulse_sum.saturating_add(sum);

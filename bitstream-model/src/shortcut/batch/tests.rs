@@ -59,9 +59,25 @@ pub(crate) struct Step {
     pub(crate) records: Vec<[Row; collision::ROWS]>,
     pub(crate) shape_of: Vec<u8>,
     pub(crate) velocities: Vec<Velocity>,
+    /// World inertia of each body, or none.
+    pub(crate) inertias: Vec<Stored>,
 }
 
 impl Step {
+    pub(crate) fn properties(&self) -> Properties<'_> {
+        let Self { shape_of, inertias, .. } = self;
+        Properties { shape_of, masses: &MASSES, inertias }
+    }
+
+    /// The same with the inertia of the shapes.
+    fn isotropic(self) -> Self {
+        Self { inertias: Vec::new(), ..self }
+    }
+
+    fn inertia(&self) -> Inertia {
+        if self.inertias.is_empty() { Inertia::Isotropic } else { Inertia::World }
+    }
+
     pub(crate) fn streams(&self, records: Range<usize>) -> [Vec<Beat>; 4] {
         let mut streams = [const { Vec::new() }; 4];
         for rows in &self.records[records] {
@@ -107,8 +123,19 @@ impl Step {
         &self,
         contact: u32,
         passes: u32,
-        masses: &[Mass],
     ) -> (Vec<Velocity>, Vec<Impulses>, u64) {
+        match self.inertia() {
+            Inertia::Isotropic => self.expected_with::<F, Isotropic>(contact, passes),
+            Inertia::World => self.expected_with::<F, World>(contact, passes),
+        }
+    }
+
+    fn expected_with<F: Format, I: form::Inertia>(
+        &self,
+        contact: u32,
+        passes: u32,
+    ) -> (Vec<Velocity>, Vec<Impulses>, u64) {
+        let properties = self.properties();
         let mut velocities = self.velocities.clone();
         let mut impulses = vec![[0.0; 4]; self.records.len()];
         let mut sum = 0_u64;
@@ -119,19 +146,19 @@ impl Step {
                     continue;
                 }
                 let sides = [collision.body_a as usize, collision.body_b as usize];
-                let both = sides.map(|body| masses[usize::from(self.shape_of[body])]);
+                let both = sides.map(|body| properties.mass(body));
                 let mut pair = sides.map(|body| velocities[body]);
                 let arguments = (&collision, &PARAMETERS, &both);
                 let (collision, parameters, both) = arguments;
                 if pass < contact {
-                    solver::contact::<F, F, Isotropic>(
+                    solver::contact::<F, F, I>(
                         collision, parameters, both, &mut pair, impulses, None,
                     );
                 } else {
                     if pass == contact {
                         *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
                     }
-                    solver::friction::<F, F, Isotropic>(
+                    solver::friction::<F, F, I>(
                         collision, parameters, both, &mut pair, impulses, None,
                     );
                 }
@@ -229,10 +256,11 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
             (
                 prop::collection::vec(0..shapes, bodies),
                 prop::collection::vec((vector(4.0, special), vector(4.0, special)), bodies),
+                prop::collection::vec((vector(4.0, special), vector(1.0, special)), bodies),
                 prop::collection::vec((0..bodies, 1..bodies, numbers(special)), 0..collisions),
             )
         })
-        .prop_map(|(mut shape_of, velocities, collisions)| {
+        .prop_map(|(mut shape_of, velocities, inertias, collisions)| {
             let bodies = shape_of.len();
             // The last one moves and stands in where neither would.
             shape_of[bodies - 1] = 1;
@@ -255,7 +283,12 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
                 if moves { velocity } else { Velocity::default() }
             });
             let velocities = velocities.collect();
-            Step { records, shape_of, velocities }
+            let inertia = |(diagonal, others): ([f32; 3], [f32; 3])| {
+                let ([xx, yy, zz], [xy, xz, yz]) = (diagonal, others);
+                [xx, yy, zz, xy, xz, yz]
+            };
+            let inertias = inertias.into_iter().map(inertia).collect();
+            Step { records, shape_of, velocities, inertias }
         })
 }
 
@@ -267,13 +300,13 @@ pub(crate) fn batch(threads: usize, width: prop::sample::Index) -> Batch {
 
 /// Runs a step in a batch, the passes in two calls, and compares.
 fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Batch {
-    let batch = batch.of(F::PRECISION, 1);
+    let batch = batch.of(F::PRECISION, 1).with_inertia(step.inertia());
     let mut batch = step.decoded(batch, step.records.len() / 3, &MASSES);
-    let (expected, impulses, sum) = step.expected::<F>(contact, passes, &MASSES);
+    let (expected, impulses, sum) = step.expected::<F>(contact, passes);
     let mut found = step.velocities.clone();
     let halt = halt.min(passes);
     for part in [0..halt, halt..passes] {
-        batch.run(part, contact, &PARAMETERS, &step.shape_of, &MASSES, &mut found);
+        batch.run(part, contact, &PARAMETERS, step.properties(), &mut found);
     }
     assert_eq!(velocity_bits(&found), velocity_bits(&expected));
     for (index, expected) in impulses.iter().enumerate() {
@@ -285,14 +318,14 @@ fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: 
 
 /// Runs two passes of a step, then a third one in two parts, and compares.
 fn check_parts<F: Tested>(step: &Step, batch: Batch, cut: usize) {
-    let mut batch = step.decoded(batch.of(F::PRECISION, 1), cut, &MASSES);
+    let mut batch =
+        step.decoded(batch.of(F::PRECISION, 1).with_inertia(step.inertia()), cut, &MASSES);
     let mut velocities = step.velocities.clone();
-    let shapes = &step.shape_of;
-    batch.run(0..2, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+    batch.run(0..2, 1, &PARAMETERS, step.properties(), &mut velocities);
     for part in [0..cut, cut..step.records.len()] {
-        batch.run_part(2, part, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+        batch.run_part(2, part, 1, &PARAMETERS, step.properties(), &mut velocities);
     }
-    let (expected, impulses, sum) = step.expected::<F>(1, 3, &MASSES);
+    let (expected, impulses, sum) = step.expected::<F>(1, 3);
     assert_eq!(velocity_bits(&velocities), velocity_bits(&expected));
     for (index, expected) in impulses.iter().enumerate() {
         assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
@@ -333,6 +366,8 @@ proptest! {
     ) {
         let batch = || batch(threads, width);
         check::<Single>(&step, batch(), contact, contact + friction, halt);
+        let step = step.isotropic();
+        check::<Single>(&step, batch(), contact, contact + friction, halt);
         check::<Half>(&step.in_format::<Half>(), batch(), contact, contact + friction, halt);
     }
 
@@ -343,6 +378,8 @@ proptest! {
         friction in 0_u32..3,
         width: prop::sample::Index,
     ) {
+        check::<Single>(&step, batch(1, width), contact, contact + friction, 1);
+        let step = step.isotropic();
         check::<Single>(&step, batch(1, width), contact, contact + friction, 1);
         let step = step.in_format::<Half>();
         check::<Half>(&step, batch(1, width), contact, contact + friction, 1);
@@ -355,6 +392,8 @@ proptest! {
         width: prop::sample::Index,
     ) {
         let cut = cut.min(step.records.len());
+        check_parts::<Single>(&step, batch(1, width), cut);
+        let step = step.isotropic();
         check_parts::<Single>(&step, batch(1, width), cut);
         check_parts::<Half>(&step.in_format::<Half>(), batch(1, width), cut);
     }
@@ -397,7 +436,8 @@ fn chain(pairs: &[[u32; 2]], bodies: usize, fixed: &[usize]) -> Step {
         Velocity { linear: [0.1 * speed, speed, 0.0], angular: [speed, 0.0, -speed] }
     };
     let records = records.collect();
-    Step { records, velocities: (0..bodies).map(velocity).collect(), shape_of }
+    let velocities = (0..bodies).map(velocity).collect();
+    Step { records, velocities, shape_of, inertias: Vec::new() }
 }
 
 #[test]

@@ -24,15 +24,18 @@ use pgs_support::lanes::{Instructions, Work, prefetch};
 use super::Stage;
 use super::block::{Block, LANES, kind};
 use super::grouping::Places;
-use super::kernel::{self, BodyRow, Pass};
+use super::inertia::Form;
+use super::kernel::{self, BodyRow, InertiaRow, Pass, Rows};
 use super::numbers::Computed;
 use super::order::Order;
 use super::width::Width;
+use crate::accelerator::arithmetic::inertia::{Isotropic, World};
 use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::per_record::fixed_impulse;
 use crate::accelerator::solver::{Mass, SolverParameters, Velocity};
 use crate::cast::register;
 use pgs_interface::number::Precision;
+use pgs_interface::profile::Inertia;
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
@@ -70,6 +73,7 @@ pub(crate) struct Passes<'a> {
     pub(crate) width: Width,
     /// Precision of the arithmetic.
     pub(crate) precision: Precision,
+    pub(crate) inertia: Inertia,
 }
 
 impl Fronts {
@@ -86,12 +90,13 @@ impl Fronts {
     }
 
     /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
-    /// of the blocks are in `lines`.
+    /// of the blocks are in `lines`, and with world inertia as many in `inertias`.
     pub(crate) fn run(
         &mut self,
         passes: Passes<'_>,
         blocks: &mut [Block],
         lines: &mut [Line],
+        inertias: &[InertiaRow],
         crew: &mut Crew,
     ) -> u64 {
         let count = passes.numbers.len();
@@ -105,7 +110,7 @@ impl Fronts {
             passes,
             blocks: blocks.as_mut_ptr(),
             order: &self.order.blocks,
-            bodies: lines.as_mut_ptr().cast(),
+            rows: Rows { bodies: lines.as_mut_ptr().cast(), inertias: inertias.as_ptr() },
             needs: &self.needs,
             progress: &self.progress[..count],
             next: AtomicUsize::new(0),
@@ -119,7 +124,7 @@ impl Fronts {
 }
 
 /// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
-/// the angular velocity and the inverse inertia.
+/// the angular velocity and the inverse inertia, if that is one number.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct Line([BodyRow; 2]);
@@ -148,7 +153,7 @@ struct Field<'a> {
     blocks: *mut Block,
     /// All blocks, each once.
     order: &'a [u32],
-    bodies: *mut BodyRow,
+    rows: Rows,
     needs: &'a [u32],
     progress: &'a [Progress],
     /// The next pass that no thread has taken.
@@ -274,14 +279,20 @@ impl Field<'_> {
 
     /// Runs a pass over a chunk that the pass before has left behind.
     fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
-        match self.passes.precision {
-            Precision::F32 => self.chunk_in::<Single>(pass, chunk, thread),
-            Precision::Binary16 => self.chunk_in::<Half>(pass, chunk, thread),
+        match (self.passes.precision, self.passes.inertia) {
+            (Precision::F32, Inertia::Isotropic) => {
+                self.chunk_in::<Single, Isotropic>(pass, chunk, thread);
+            }
+            (Precision::F32, Inertia::World) => {
+                self.chunk_in::<Single, World>(pass, chunk, thread);
+            }
+            // No layout has world inertia in sixteen bits.
+            (Precision::Binary16, _) => self.chunk_in::<Half, Isotropic>(pass, chunk, thread),
         }
     }
 
-    /// The same in a format.
-    fn chunk_in<F: Computed>(&self, pass: usize, chunk: usize, thread: usize) {
+    /// The same in a format, with a form of inertia.
+    fn chunk_in<F: Computed, I: Form>(&self, pass: usize, chunk: usize, thread: usize) {
         let number = self.passes.numbers.start + register(pass);
         let stage = Stage::new(number, self.passes.contact);
         let pass = Pass {
@@ -292,7 +303,7 @@ impl Field<'_> {
         };
         let mut sum = 0;
         let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
-        let format = PhantomData::<F>;
+        let format = PhantomData::<(F, I)>;
         let work = ChunkWork { field: self, pass, blocks, sum: &mut sum, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
@@ -305,15 +316,15 @@ impl Field<'_> {
 }
 
 /// A pass over the blocks of a chunk.
-struct ChunkWork<'a, F> {
+struct ChunkWork<'a, F, I> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
     blocks: &'a [u32],
     sum: &'a mut u64,
-    format: PhantomData<F>,
+    format: PhantomData<(F, I)>,
 }
 
-impl<F: Computed> Work for ChunkWork<'_, F> {
+impl<F: Computed, I: Form> Work for ChunkWork<'_, F, I> {
     type Output = ();
 
     #[inline(always)]
@@ -330,14 +341,15 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
                 // has the chunk, the rows of its bodies are its own: see `Sync`.
-                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
+                let sum = unsafe { one_by_one::<F, I>(&self.pass, block, self.field.rows) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
             let arithmetic = F::arithmetic(instructions);
             // SAFETY: the same holds for the rows of its bodies, and for the spare one.
             unsafe {
-                kernel::solve(arithmetic, instructions, &self.pass, block, self.field.bodies);
+                let rows = self.field.rows;
+                kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, rows);
             }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
@@ -346,7 +358,7 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
     }
 }
 
-impl<F: Computed> ChunkWork<'_, F> {
+impl<F: Computed, I: Form> ChunkWork<'_, F, I> {
     fn one_by_one(self) {
         for &index in self.blocks {
             // SAFETY: `order` has numbers of blocks.
@@ -355,7 +367,7 @@ impl<F: Computed> ChunkWork<'_, F> {
             let block = unsafe { &mut *block };
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
             // has the chunk, the rows of its bodies are its own: see `Sync`.
-            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
+            let sum = unsafe { one_by_one::<F, I>(&self.pass, block, self.field.rows) };
             *self.sum = self.sum.saturating_add(sum);
         }
     }
@@ -371,9 +383,9 @@ fn counted<F: Computed>(block: &Block) -> u64 {
 ///
 /// # Safety
 ///
-/// The rows of the block exist. While this runs, no other thread writes them, and none reads the rows
-/// of moving bodies.
-unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, bodies: *mut BodyRow) -> u64 {
+/// The rows of the block exist, with world inertia in both arrays. While this runs, no other thread
+/// writes them, and none reads the rows of moving bodies.
+unsafe fn one_by_one<F: Computed, I: Form>(pass: &Pass<'_>, block: &mut Block, rows: Rows) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {
         let collision = block.collision(lane);
@@ -382,27 +394,41 @@ unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, bodies: *m
         }
         let mut masses = [Mass::default(); 2];
         let mut velocities = [Velocity::default(); 2];
+        let mut beside = [0.0; 2];
         for side in 0..2 {
+            let index = block.rows[side][lane] as usize;
             // SAFETY: the caller promises that the row exists.
-            let row = unsafe { bodies.add(block.rows[side][lane] as usize) };
+            let row = unsafe { rows.bodies.add(index) };
             // SAFETY: the caller promises that it can be read.
             let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
             velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
-            masses[side] = Mass { inverse_mass: m, inverse_inertia: [k, 0.0, 0.0, 0.0, 0.0, 0.0] };
+            let inverse_inertia = I::stored(k, || {
+                // SAFETY: the caller promises that the row exists.
+                let row = unsafe { rows.inertias.add(index) };
+                // SAFETY: nobody writes an inertia.
+                unsafe { row.read() }
+            });
+            masses[side] = Mass { inverse_mass: m, inverse_inertia };
+            beside[side] = k;
         }
         let mut impulses = block.impulses(lane);
         let stage = pass.stage;
-        let share =
-            stage.solve::<F>(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
+        let share = stage.solve::<F, I>(
+            &collision,
+            pass.parameters,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         sum = sum.saturating_add(share);
         block.put_impulses(lane, impulses);
         for side in 0..2 {
             if block.kind[lane] & kind::MOVES[side] != 0 {
                 let (Velocity { linear: [x, y, z], angular: [p, q, r] }, mass) =
                     (velocities[side], masses[side]);
-                let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
+                let row = [[x, y, z, mass.inverse_mass], [p, q, r, beside[side]]];
                 // SAFETY: the caller promises that the row exists.
-                let at = unsafe { bodies.add(block.rows[side][lane] as usize) };
+                let at = unsafe { rows.bodies.add(block.rows[side][lane] as usize) };
                 // SAFETY: the caller promises that a moving body's can be written.
                 unsafe { at.write(row) };
             }

@@ -42,7 +42,7 @@ impl Decoded {
         Self {
             layout,
             translation: (!layout.in_place).then(|| Translation::new(layout)),
-            batch: batch.of(layout.precision, layout.together),
+            batch: batch.of(layout.precision, layout.together).with_inertia(layout.inertia),
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
             sums: vec![0],

@@ -17,6 +17,7 @@ pub(crate) struct Layout {
     pub(crate) format: StreamFormat,
     /// The precision of all arithmetic.
     pub(crate) precision: Precision,
+    pub(crate) inertia: Inertia,
     /// Collisions of an issue; padding completes the last issue. Where it is two, records are in
     /// world coordinates and sixteen bits.
     pub(crate) together: usize,
@@ -28,6 +29,8 @@ pub(crate) struct Layout {
     pub(crate) in_place: bool,
     /// How velocities, poses and results lie on the streams, if all three take turns on them.
     pub(crate) bodies: Option<Turns>,
+    /// Rows of a body's velocity.
+    pub(crate) velocity_rows: usize,
 }
 
 impl Layout {
@@ -42,7 +45,7 @@ impl Layout {
         } else {
             return None;
         };
-        let computed = variant.inertia == Inertia::Isotropic
+        let computed = (variant.inertia == Inertia::Isotropic || precision == Precision::F32)
             && matches!(profile.flow, Flow::Passes)
             && config.subnormals == Subnormals::Keep
             && config.hazards == Hazards::Interlocked;
@@ -83,7 +86,18 @@ impl Layout {
             .filter(|_| wide && precision == Precision::F32)
             .filter(|turns| of(&poses, widths) == Some(*turns))
             .filter(|turns| of(&results, profile.s2mm_widths) == Some(*turns));
-        Some(Self { format, precision, together, share, places, in_place, bodies })
+        let (inertia, velocity_rows) = (variant.inertia, variant.velocity_rows());
+        Some(Self {
+            format,
+            precision,
+            inertia,
+            together,
+            share,
+            places,
+            in_place,
+            bodies,
+            velocity_rows,
+        })
     }
 }
 
@@ -107,6 +121,17 @@ mod tests {
         assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
         assert_eq!(mixed.share, [1, 1, 1, 0]);
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn world_inertia_takes_the_same_way_where_numbers_have_thirty_two_bits() {
+        for profile in [&FLOAT, &MIXED] {
+            let inertia = Inertia::World;
+            let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+            let layout = Layout::of(&config).expect("it has short cuts");
+            assert_eq!((layout.inertia, layout.velocity_rows), (inertia, 4));
+            assert!(layout.bodies.is_some());
+        }
     }
 
     #[test]
@@ -151,7 +176,7 @@ mod tests {
         }
         let usual = BoardConfig { profile: &MIXED, ..BoardConfig::default() };
         for config in [
-            BoardConfig { inertia: Inertia::World, ..usual },
+            BoardConfig { inertia: Inertia::World, profile: &HALF, ..usual },
             BoardConfig { hazards: Hazards::Unchecked, ..usual },
             BoardConfig { subnormals: Subnormals::Flush, ..usual },
         ] {

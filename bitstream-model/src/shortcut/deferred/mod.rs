@@ -15,7 +15,7 @@ use crate::accelerator::control::{Arguments, Shape};
 use crate::accelerator::defer::{ArrivedRecords, Defer};
 use crate::accelerator::records::results::Results;
 use crate::accelerator::records::segment::{PacketError, Segment};
-use crate::accelerator::records::striping::STREAMS_MAX;
+use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX};
 use crate::config::BoardConfig;
 use crate::stream::Stream;
 use decode_once::Decoded;
@@ -92,7 +92,7 @@ impl Defer for Deferred {
         velocities: &mut Segment,
         arrived: &mut ArrivedRecords<'_>,
     ) -> Option<Result<u32, PacketError>> {
-        let rows = self.rows_of_next(velocities, arrived)?;
+        let rows = self.rows_of_next(self.rows_of_velocity(), velocities, arrived)?;
         let sum = self.load_rows(accelerator, arrived.records, rows);
         if sum.is_ok() {
             velocities.skip(arrived.records, arrived.inputs);
@@ -108,7 +108,7 @@ impl Defer for Deferred {
         arrived: &mut ArrivedRecords<'_>,
         outputs: &mut [Stream],
     ) -> Option<[u32; 2]> {
-        let rows = self.rows_of_next(poses, arrived)?;
+        let rows = self.rows_of_next(ROWS_IN, poses, arrived)?;
         let sums = self.integrate_rows(accelerator, results, arrived.records, rows, outputs);
         poses.skip(arrived.records, arrived.inputs);
         Some(sums)

@@ -8,6 +8,7 @@ use crate::accelerator::defer::ArrivedRecords;
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::PerStream;
 use crate::memory::Memory;
+use crate::shortcut::batch::Properties;
 use crate::stream::Stream;
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -141,11 +142,11 @@ impl Deferred {
         let parameters = &accelerator.arguments.solver;
         let passes = self.computed..pass;
         let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
-        let (shapes, velocities) = (&accelerator.shape_of, &mut accelerator.velocities);
-        batch.run(passes, contact, parameters, shapes, masses, velocities);
+        let Accelerator { velocities, shape_of, inertias, .. } = accelerator;
+        let properties = Properties { shape_of, masses, inertias };
+        batch.run(passes, contact, parameters, properties, velocities);
         if collisions > 0 {
-            let part = 0..collisions;
-            batch.run_part(pass, part, contact, parameters, shapes, masses, velocities);
+            batch.run_part(pass, 0..collisions, contact, parameters, properties, velocities);
         }
         self.computed = pass;
         accelerator.counters.impulse_sum = batch.impulse_sum();

@@ -14,6 +14,7 @@ use crate::memory::Source;
 use crate::shortcut::deferred::{Ahead, BodyRows, Coming, Deferred};
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
+use pgs_interface::record::velocity;
 
 /// Where the next beats of each input are, the ones in its FIFO before the ones about to come, and
 /// how many.
@@ -159,6 +160,7 @@ fn bodies(
     results: Option<Results>,
 ) -> Option<u64> {
     let turns = deferred.bodies()?;
+    let rows_of_body = if results.is_some() { ROWS_IN } else { deferred.rows_of_velocity() };
     if results.is_none() && !outputs_rest(&stretch) {
         return None;
     }
@@ -167,7 +169,7 @@ fn bodies(
     let mut limits = Limits {
         cycles: stretch.until - stretch.now,
         // The last bodies end packets.
-        records: (segment.left() + 1).saturating_sub(turns.streams.div_ceil(ROWS_IN)),
+        records: (segment.left() + 1).saturating_sub(turns.streams.div_ceil(rows_of_body)),
         beats: PerEngine::default(),
     };
     let mut writes = [(0, 0); STREAMS_MAX];
@@ -186,29 +188,25 @@ fn bodies(
     }
     let mut flow = begin(&stretch, limits);
     let done = segment.done;
-    match (turns.streams, results.is_some()) {
-        (4, false) => flow.run(&mut Bodies::<4, false> { done }),
-        (4, true) => flow.run(&mut Bodies::<4, true> { done }),
-        (3, false) => flow.run(&mut Bodies::<3, false> { done }),
-        (3, true) => flow.run(&mut Bodies::<3, true> { done }),
-        (2, false) => flow.run(&mut Bodies::<2, false> { done }),
-        (2, true) => flow.run(&mut Bodies::<2, true> { done }),
-        (_, false) => flow.run(&mut Bodies::<1, false> { done }),
-        (_, true) => flow.run(&mut Bodies::<1, true> { done }),
+    match turns.streams {
+        4 => flow_of::<4>(&mut flow, done, rows_of_body, results.is_some()),
+        3 => flow_of::<3>(&mut flow, done, rows_of_body, results.is_some()),
+        2 => flow_of::<2>(&mut flow, done, rows_of_body, results.is_some()),
+        _ => flow_of::<1>(&mut flow, done, rows_of_body, results.is_some()),
     }
     let Flowed { cycles, waits, records, beats } = flow.flowed;
     if cycles == 0 {
         return None;
     }
     let mut reads = sources;
-    let [before, after] = [done, done + records].map(|bodies| turns.counts(ROWS_IN * bodies));
+    let [before, after] = [done, done + records].map(|bodies| turns.counts(rows_of_body * bodies));
     for k in 0..stretch.cores.len() {
         reads[k].1 = after[k] - before[k];
         writes[k].1 = beats[2 * k + 1];
     }
     let Stretch { accelerator, inputs, outputs, memory, .. } = &mut stretch;
     let (views, places) = memory.lend(reads, writes)?;
-    let rows = BodyRows { views, turns, first: done };
+    let rows = BodyRows { views, turns, rows: rows_of_body, first: done };
     pass_inputs(inputs, &flow, &coming);
     let phase = match results {
         None => {
@@ -232,6 +230,17 @@ fn bodies(
     accelerator.pass_over(cycles, waits, phase);
     pass_cores(&mut stretch, &flow);
     Some(cycles)
+}
+
+/// Lets bodies of that many rows flow on that many streams.
+fn flow_of<const STREAMS: usize>(flow: &mut Flow, done: usize, rows: usize, results: bool) {
+    match (rows, results) {
+        (_, true) => flow.run(&mut Bodies::<STREAMS, ROWS_IN, true> { done }),
+        (velocity::WORLD_ROWS, false) => {
+            flow.run(&mut Bodies::<STREAMS, { velocity::WORLD_ROWS }, false> { done });
+        }
+        (_, false) => flow.run(&mut Bodies::<STREAMS, ROWS_IN, false> { done }),
+    }
 }
 
 /// The next beats of each input, if the ones in its FIFO lie before the ones about to come, in the

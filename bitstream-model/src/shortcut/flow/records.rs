@@ -2,7 +2,7 @@
 
 use super::PerEngine;
 use crate::accelerator::Accelerator;
-use crate::accelerator::records::striping::{PerStream, ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
+use crate::accelerator::records::striping::{PerStream, ROWS_OUT, STREAMS_MAX, Turns};
 use crate::shortcut::deferred::{Ahead, Deferred};
 
 /// Records that flow one after the other: the bodies of a phase, or the issues of a pass. They are
@@ -71,15 +71,15 @@ impl Records for Issues<'_> {
     }
 }
 
-/// Bodies that are loaded, or leave with their results, on streams that take turns. The number of
-/// streams divides every count of beats: it is a constant.
+/// Bodies of that many rows that are loaded, or leave with their results, on streams that take turns. The
+/// number of streams divides every count of beats: it is a constant.
 #[derive(Debug)]
-pub(super) struct Bodies<const STREAMS: usize, const RESULTS: bool> {
+pub(super) struct Bodies<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> {
     /// Bodies of the phase before the flow.
     pub(super) done: usize,
 }
 
-impl<const STREAMS: usize, const RESULTS: bool> Bodies<STREAMS, RESULTS> {
+impl<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> Bodies<STREAMS, ROWS, RESULTS> {
     const TURNS: Turns = Turns { streams: STREAMS };
 
     /// `count` of the rows before the first of some bodies, and of the rows up to the last one.
@@ -99,14 +99,16 @@ impl<const STREAMS: usize, const RESULTS: bool> Bodies<STREAMS, RESULTS> {
     }
 }
 
-impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESULTS> {
+impl<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> Records
+    for Bodies<STREAMS, ROWS, RESULTS>
+{
     const RESULTS: bool = RESULTS;
 
     #[inline(always)]
     fn ready(&self, first: usize, held: &PerEngine, depth: usize) -> usize {
         let body = self.done + first;
-        let came = Self::TURNS.counts(ROWS_IN * body);
-        let there = Self::TURNS.contiguous(|k| came[k] + held[2 * k]) / ROWS_IN - body;
+        let came = Self::TURNS.counts(ROWS * body);
+        let there = Self::TURNS.contiguous(|k| came[k] + held[2 * k]) / ROWS - body;
         if !RESULTS {
             return there;
         }
@@ -118,7 +120,7 @@ impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESU
     /// A row a cycle on each stream: a result takes longer than its pose.
     #[inline(always)]
     fn cycles_max(&self, first: usize, records: usize) -> u64 {
-        let rows = if RESULTS { ROWS_OUT } else { ROWS_IN };
+        let rows = if RESULTS { ROWS_OUT } else { ROWS };
         let [before, after] = self.rows(first, records, rows, |rows| Self::TURNS.cycles(rows));
         after - before
     }
@@ -127,7 +129,7 @@ impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESU
     fn beats(&self, first: usize, records: usize) -> (PerStream, PerStream) {
         let given =
             if RESULTS { self.beats_of(first, records, ROWS_OUT) } else { [0; STREAMS_MAX] };
-        (self.beats_of(first, records, ROWS_IN), given)
+        (self.beats_of(first, records, ROWS), given)
     }
 
     #[inline(always)]
