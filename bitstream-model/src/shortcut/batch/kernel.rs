@@ -8,6 +8,7 @@
 
 use super::Stage;
 use super::block::{Block, Words, kind};
+use super::given::Given;
 use super::inertia::{Form, Times};
 use super::numbers::{Arithmetic, Numbers};
 use super::vector::{Vector, add, cross, dot, either, neg, sub, times};
@@ -188,7 +189,7 @@ unsafe fn side<A: Arithmetic, F: Form>(
     let [linear, angular] = unsafe { gathered(instructions, rows.bodies, indices) };
     let ([x, y, z, m], [p, q, r, beside]) = (of(linear), of(angular));
     let k = if F::ABOUT_AXES {
-        // SAFETY: the caller promises that every body has a row; nobody writes an inertia.
+        // SAFETY: the caller promises that every body has a row, and no thread writes an inertia.
         let [diagonal, others] = unsafe { gathered(instructions, rows.inertias, indices) };
         F::about_axes(of(diagonal), of(others))
     } else {
@@ -221,7 +222,8 @@ unsafe fn put_side<A: Arithmetic, K>(
     }
 }
 
-/// One pass over the collisions of a block that is not serial.
+/// One pass over the collisions of a block that is not serial. In a warm pass `given` takes the place of
+/// the impulses that the others compute.
 ///
 /// # Safety
 ///
@@ -233,6 +235,7 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     instructions: impl Instructions,
     pass: &Pass<'_>,
     block: &mut Block,
+    given: Option<&Given>,
     rows: Rows,
 ) {
     let moves = kind::MOVES.map(|bit| tested(block, bit));
@@ -243,9 +246,9 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     // SAFETY: the caller promises that the block's rows exist, and that no other thread writes them.
     let mut b = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[1]) };
     if pass.stage.contact {
-        contact(arithmetic, pass, block, counts, &mut a, &mut b);
+        contact(arithmetic, pass, block, given, counts, &mut a, &mut b);
     } else {
-        friction(arithmetic, pass, block, counts, &mut a, &mut b);
+        friction(arithmetic, pass, block, given, counts, &mut a, &mut b);
     }
     for (each, side) in [a, b].iter().enumerate() {
         let mut written = block.rows[each];
@@ -271,6 +274,7 @@ fn contact<A: Arithmetic, K: Times<A>>(
     arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
+    given: Option<&Given>,
     counts: Numbers<A>,
     a: &mut Side<A, K>,
     b: &mut Side<A, K>,
@@ -292,10 +296,14 @@ fn contact<A: Arithmetic, K: Times<A>>(
         let row = Row::new(minus_one, n, arms.0, arms.1, a, b);
         let reached = counts.above(arithmetic.splat(k as f32));
         let active = some(reached.without(row.jacobian.is_zero()));
-        let bias = ((distance + drift) * coefficient) * per_second;
-        let wanted = (row.speed(a, b) + bias) * row.jacobian;
         let before = arithmetic.load(&block.impulses[k]);
-        let after = (before + wanted).larger(zero);
+        let after = if let Some(given) = given {
+            arithmetic.load(&given.normal[k])
+        } else {
+            let bias = ((distance + drift) * coefficient) * per_second;
+            let wanted = (row.speed(a, b) + bias) * row.jacobian;
+            (before + wanted).larger(zero)
+        };
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
@@ -310,6 +318,7 @@ fn friction<A: Arithmetic, K: Times<A>>(
     arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
+    given: Option<&Given>,
     counts: Numbers<A>,
     a: &mut Side<A, K>,
     b: &mut Side<A, K>,
@@ -352,9 +361,13 @@ fn friction<A: Arithmetic, K: Times<A>>(
     for (k, t) in tangents.into_iter().enumerate() {
         let row = Row::new(minus_one, t, arm_a, arm_b, a, b);
         let active = some(taken.without(row.jacobian.is_zero()));
-        let wanted = row.speed(a, b) * row.jacobian;
         let before = arithmetic.load(&block.impulses[1 + k]);
-        let after = (before + wanted).larger(-limit).smaller(limit);
+        let after = if let Some(given) = given {
+            arithmetic.load(&given.friction[k])
+        } else {
+            let wanted = row.speed(a, b) * row.jacobian;
+            (before + wanted).larger(-limit).smaller(limit)
+        };
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
@@ -362,6 +375,9 @@ fn friction<A: Arithmetic, K: Times<A>>(
         stored.store(&mut block.impulses[1 + k]);
         let pushes = [times(t, a.m), times(neg(t), b.m)];
         row.apply(after - before, active, pushes, a, b);
+    }
+    if given.is_some() {
+        return;
     }
     let spins = if pass.finds {
         let apart = unit(arithmetic, sub(position_b, position_a));

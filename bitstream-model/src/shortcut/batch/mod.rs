@@ -12,6 +12,7 @@
 mod block;
 mod convert;
 mod decode;
+mod given;
 mod grouping;
 mod inertia;
 mod kernel;
@@ -43,6 +44,7 @@ use pgs_interface::record::CONTACT_POINTS;
 
 use block::{Block, LANES, ROWS_APART};
 use decode::{Group, PUT_OFF};
+use given::Given;
 use grouping::Places;
 use kernel::InertiaRow;
 use wavefront::{Fronts, Line, Passes};
@@ -50,7 +52,7 @@ use width::Width;
 
 pub(crate) use convert::Translation;
 pub(crate) use motion::ResultPlaces;
-pub(crate) use records::PLACES;
+pub(crate) use records::{IMPULSES, PLACES};
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
@@ -65,18 +67,36 @@ struct Stage {
     /// The last contact pass, which counts its impulses, or the first friction pass, which adds the
     /// impulses of each collision.
     turning: bool,
+    /// Given impulses take the place of the computed ones.
+    warm: bool,
+}
+
+/// The passes of a step, numbered from 0.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plan<'a> {
+    /// How many are contact passes: the first ones.
+    pub(crate) contact: u32,
+    /// Whether impulses are given to the first pass of each kind.
+    pub(crate) warm: bool,
+    pub(crate) parameters: &'a SolverParameters,
+}
+
+impl Plan<'_> {
+    fn stage(&self, pass: u32) -> Stage {
+        let contact = pass < self.contact;
+        let turning = if contact { pass + 1 == self.contact } else { pass == self.contact };
+        Stage { contact, turning, warm: self.warm && (pass == 0 || pass == self.contact) }
+    }
+
+    /// Whether a pass damps spins.
+    fn damps(&self, pass: u32) -> bool {
+        pass >= self.contact && !self.stage(pass).warm
+    }
 }
 
 impl Stage {
-    fn new(pass: u32, contact: u32) -> Self {
-        if pass < contact {
-            Self { contact: true, turning: pass + 1 == contact }
-        } else {
-            Self { contact: false, turning: pass == contact }
-        }
-    }
-
-    /// The pass over one collision; returns its share of the impulse sum.
+    /// The pass over one collision, which may have brought impulses; returns its share of the impulse
+    /// sum.
     fn solve<F: Format, I: form::Inertia>(
         self,
         collision: &Collision,
@@ -85,19 +105,20 @@ impl Stage {
         velocities: &mut [Velocity; 2],
         impulses: &mut Impulses,
     ) -> u64 {
+        let given = self.warm.then_some(&collision.impulses);
         if self.contact {
-            solver::contact::<F, F, I>(collision, parameters, masses, velocities, impulses, None);
+            solver::contact::<F, F, I>(collision, parameters, masses, velocities, impulses, given);
             return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
         }
         if self.turning {
             *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
         }
-        solver::friction::<F, F, I>(collision, parameters, masses, velocities, impulses, None);
+        solver::friction::<F, F, I>(collision, parameters, masses, velocities, impulses, given);
         0
     }
 }
 
-/// What the bodies of a step are like.
+/// The shapes, masses and inertias of the bodies of a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Properties<'a> {
     pub(crate) shape_of: &'a [u8],
@@ -144,6 +165,8 @@ pub(crate) struct Batch {
     inertias: Vec<InertiaRow>,
     /// Whether the lines have the velocities of all bodies.
     entered: bool,
+    /// In a step with a warm start the impulses that came in, for each block.
+    given: Vec<Given>,
     /// Records that are put into their blocks when the threads have ended.
     put_off: Vec<Group>,
     /// Whether the records of the step have the friction of their pair above the contact count.
@@ -177,6 +200,7 @@ impl Batch {
             lines: Vec::new(),
             inertias: Vec::new(),
             entered: false,
+            given: Vec::new(),
             put_off: Vec::with_capacity(PUT_OFF),
             pair_friction: false,
         }
@@ -208,6 +232,16 @@ impl Batch {
         self.measured = false;
         self.spins = false;
         self.bodies = 0;
+        self.entered = false;
+    }
+
+    /// Forgets the passes that were run: the next one begins with the velocities that are entered then.
+    pub(crate) fn restart(&mut self) {
+        let blocks = &mut self.blocks[..self.places.blocks()];
+        self.crew.each(blocks.chunks_mut(COPIED_TOGETHER / LANES), |blocks| {
+            blocks.iter_mut().for_each(Block::forget_impulses);
+        });
+        self.impulse_sum = 0;
         self.entered = false;
     }
 
@@ -290,15 +324,14 @@ impl Batch {
         self.places.distance()
     }
 
-    /// Runs whole passes over all collisions. A step's passes are numbered from 0; the first `contact`
-    /// are contact passes. `velocities` has an entry for every body.
+    /// Runs whole passes over all collisions, from the velocities on that were entered before, or else
+    /// from `velocities` on, which has an entry for every body. [`leave`](Self::leave) gives the new ones.
     pub(crate) fn run(
         &mut self,
         passes: Range<u32>,
-        contact: u32,
-        parameters: &SolverParameters,
+        plan: &Plan<'_>,
         properties: Properties<'_>,
-        velocities: &mut [Velocity],
+        velocities: &[Velocity],
     ) {
         if passes.is_empty() || self.places.blocks() == 0 {
             return;
@@ -308,23 +341,34 @@ impl Batch {
             self.measured = true;
         }
         self.enter(velocities, properties);
-        let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
+        let finding = passes.clone().find(|pass| plan.damps(*pass) && !self.spins);
+        if plan.warm && self.given.len() < self.places.blocks() {
+            self.given.resize(self.places.blocks(), Given::NONE);
+        }
         let (width, precision, inertia) = (self.width, self.precision, self.inertia);
         let rounded;
-        let parameters = match precision {
-            Precision::F32 => parameters,
+        let plan = match precision {
+            Precision::F32 => *plan,
             Precision::Binary16 => {
-                rounded = parameters.rounded::<Half>();
-                &rounded
+                rounded = plan.parameters.rounded::<Half>();
+                Plan { parameters: &rounded, ..*plan }
             }
         };
-        let run =
-            Passes { numbers: &passes, contact, finding, parameters, width, precision, inertia };
+        let given = &self.given[..];
+        let numbers = &passes;
+        let run = Passes { numbers, plan, finding, given, width, precision, inertia };
         let blocks = &mut self.blocks[..self.places.blocks()];
         let (lines, inertias) = (&mut self.lines, &self.inertias);
         let sum = self.fronts.run(run, blocks, lines, inertias, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
+    }
+
+    /// Stores the entered velocities as the passes have left them.
+    pub(crate) fn leave(&mut self, velocities: &mut [Velocity]) {
+        if !self.entered {
+            return;
+        }
         let own = &self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks_mut(COPIED_TOGETHER).zip(own.chunks(COPIED_TOGETHER / 2));
         self.crew.each(bodies, |(velocities, lines)| {
@@ -339,28 +383,30 @@ impl Batch {
         &mut self,
         pass: u32,
         part: Range<usize>,
-        contact: u32,
-        parameters: &SolverParameters,
+        plan: &Plan<'_>,
         properties: Properties<'_>,
         velocities: &mut [Velocity],
     ) {
-        let stage = Stage::new(pass, contact);
+        let stage = plan.stage(pass);
         self.entered = false;
         for index in part {
-            let Some((block, lane)) = self.slot(index) else { continue };
-            let block = &mut self.blocks[block];
+            let Some((at, lane)) = self.slot(index) else { continue };
+            let block = &mut self.blocks[at];
             let Entry { bodies, moving } = block.entry(lane);
             let sides = bodies.map(|body| body as usize);
             let mut pair = sides.map(|body| velocities[body]);
             let mut impulses = block.impulses(lane);
             let masses = sides.map(|body| properties.mass(body));
-            let collision = block.collision(lane);
+            let mut collision = block.collision(lane);
+            if let Some(given) = self.given.get(at) {
+                collision.impulses = given.of(stage.contact, lane);
+            }
             let solve = match (self.precision, self.inertia) {
                 (Precision::F32, Inertia::Isotropic) => Stage::solve::<Single, Isotropic>,
                 (Precision::F32, Inertia::World) => Stage::solve::<Single, World>,
                 (Precision::Binary16, _) => Stage::solve::<Half, Isotropic>,
             };
-            let sum = solve(stage, &collision, parameters, &masses, &mut pair, &mut impulses);
+            let sum = solve(stage, &collision, plan.parameters, &masses, &mut pair, &mut impulses);
             self.impulse_sum = self.impulse_sum.saturating_add(sum);
             block.put_impulses(lane, impulses);
             for side in 0..2 {

@@ -21,8 +21,9 @@ use bytemuck::{Pod, Zeroable};
 use pgs_support::Crew;
 use pgs_support::lanes::{Instructions, Work, prefetch};
 
-use super::Stage;
+use super::Plan;
 use super::block::{Block, LANES, kind};
+use super::given::Given;
 use super::grouping::Places;
 use super::inertia::Form;
 use super::kernel::{self, BodyRow, InertiaRow, Pass, Rows};
@@ -32,7 +33,7 @@ use super::width::Width;
 use crate::accelerator::arithmetic::inertia::{Isotropic, World};
 use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::per_record::fixed_impulse;
-use crate::accelerator::solver::{Mass, SolverParameters, Velocity};
+use crate::accelerator::solver::{Mass, Velocity};
 use crate::cast::register;
 use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
@@ -66,10 +67,11 @@ pub(crate) struct Fronts {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Passes<'a> {
     pub(crate) numbers: &'a Range<u32>,
-    pub(crate) contact: u32,
+    pub(crate) plan: Plan<'a>,
     /// The friction pass that finds which spins are damped.
     pub(crate) finding: Option<u32>,
-    pub(crate) parameters: &'a SolverParameters,
+    /// In a step with a warm start the impulses that came in, for each block.
+    pub(crate) given: &'a [Given],
     pub(crate) width: Width,
     /// Precision of the arithmetic.
     pub(crate) precision: Precision,
@@ -90,7 +92,7 @@ impl Fronts {
     }
 
     /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
-    /// of the blocks are in `lines`, and with world inertia as many in `inertias`.
+    /// of the blocks are in `lines`; with world inertia each has one in `inertias` too.
     pub(crate) fn run(
         &mut self,
         passes: Passes<'_>,
@@ -182,6 +184,11 @@ impl Drop for Breaks<'_> {
 }
 
 impl Field<'_> {
+    /// The impulses that a pass brings for a block.
+    fn given(&self, pass: &Pass<'_>, block: u32) -> Option<&Given> {
+        self.passes.given.get(block as usize).filter(|_| pass.stage.warm)
+    }
+
     /// The work of a thread: takes passes while any are left, then helps.
     fn work(&self, thread: usize) {
         let mut breaks = Breaks(Some(&self.broken));
@@ -294,11 +301,11 @@ impl Field<'_> {
     /// The same in a format, with a form of inertia.
     fn chunk_in<F: Computed, I: Form>(&self, pass: usize, chunk: usize, thread: usize) {
         let number = self.passes.numbers.start + register(pass);
-        let stage = Stage::new(number, self.passes.contact);
+        let stage = self.passes.plan.stage(number);
         let pass = Pass {
             stage,
             finds: self.passes.finding == Some(number),
-            parameters: self.passes.parameters,
+            parameters: self.passes.plan.parameters,
             spare: 2 * (register(thread) + 1),
         };
         let mut sum = 0;
@@ -338,10 +345,11 @@ impl<F: Computed, I: Form> Work for ChunkWork<'_, F, I> {
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
+            let given = self.field.given(&self.pass, index);
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
                 // has the chunk, the rows of its bodies are its own: see `Sync`.
-                let sum = unsafe { one_by_one::<F, I>(&self.pass, block, self.field.rows) };
+                let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
@@ -349,7 +357,7 @@ impl<F: Computed, I: Form> Work for ChunkWork<'_, F, I> {
             // SAFETY: the same holds for the rows of its bodies, and for the spare one.
             unsafe {
                 let rows = self.field.rows;
-                kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, rows);
+                kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, given, rows);
             }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
@@ -365,9 +373,10 @@ impl<F: Computed, I: Form> ChunkWork<'_, F, I> {
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
+            let given = self.field.given(&self.pass, index);
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
             // has the chunk, the rows of its bodies are its own: see `Sync`.
-            let sum = unsafe { one_by_one::<F, I>(&self.pass, block, self.field.rows) };
+            let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
             *self.sum = self.sum.saturating_add(sum);
         }
     }
@@ -385,12 +394,20 @@ fn counted<F: Computed>(block: &Block) -> u64 {
 ///
 /// The rows of the block exist, with world inertia in both arrays. While this runs, no other thread
 /// writes them, and none reads the rows of moving bodies.
-unsafe fn one_by_one<F: Computed, I: Form>(pass: &Pass<'_>, block: &mut Block, rows: Rows) -> u64 {
+unsafe fn one_by_one<F: Computed, I: Form>(
+    pass: &Pass<'_>,
+    block: &mut Block,
+    given: Option<&Given>,
+    rows: Rows,
+) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {
-        let collision = block.collision(lane);
+        let mut collision = block.collision(lane);
         if collision.count == 0 {
             continue;
+        }
+        if let Some(given) = given {
+            collision.impulses = given.of(pass.stage.contact, lane);
         }
         let mut masses = [Mass::default(); 2];
         let mut velocities = [Velocity::default(); 2];
@@ -405,7 +422,7 @@ unsafe fn one_by_one<F: Computed, I: Form>(pass: &Pass<'_>, block: &mut Block, r
             let inverse_inertia = I::stored(k, || {
                 // SAFETY: the caller promises that the row exists.
                 let row = unsafe { rows.inertias.add(index) };
-                // SAFETY: nobody writes an inertia.
+                // SAFETY: no thread writes an inertia.
                 unsafe { row.read() }
             });
             masses[side] = Mass { inverse_mass: m, inverse_inertia };

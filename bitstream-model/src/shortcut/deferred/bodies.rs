@@ -46,7 +46,7 @@ pub(crate) fn beats_of_results(turns: Turns, bodies: Range<usize>) -> PerStream 
     std::array::from_fn(|k| after[k] - before[k])
 }
 
-/// Bodies of that many rows after which the next one begins with stream 0 again.
+/// Bodies of `rows` rows each after which the next one begins with stream 0 again.
 pub(crate) const fn period(streams: usize, rows: usize) -> usize {
     let mut bodies = 1;
     while !(bodies * rows).is_multiple_of(streams) {
@@ -174,7 +174,7 @@ impl BodyRows<'_> {
     }
 }
 
-/// What the bodies of the step under way are like.
+/// The shapes, masses and inertias of the bodies of the step under way.
 pub(super) fn properties<'a>(accelerator: &'a Accelerator, masses: &'a [Mass]) -> Properties<'a> {
     Properties { shape_of: &accelerator.shape_of, masses, inertias: &accelerator.inertias }
 }

@@ -27,6 +27,8 @@ pub(crate) struct Layout {
     pub(crate) places: [(usize, usize); BEATS_MAX],
     /// Whether a batch takes the beats as they are, without conversion.
     pub(crate) in_place: bool,
+    /// Beats of a collision on each stream in a pass that brings impulses, if these can be taken.
+    pub(crate) warm_share: Option<PerStream>,
     /// How velocities, poses and results lie on the streams, if all three take turns on them.
     pub(crate) bodies: Option<Turns>,
     /// Rows of a body's velocity.
@@ -79,7 +81,10 @@ impl Layout {
         if as_it_is && !in_place {
             return None;
         }
-        let Stripes { velocities, poses, results, .. } = profile.stripes;
+        let Stripes { warm_collisions, velocities, poses, results, .. } = profile.stripes;
+        let warm_share = warm_collisions
+            .filter(|_| in_place)
+            .and_then(|stripe| warm_share(&stripe, widths, profile.initiation_interval.into()));
         let of = |stripe: &Stripe, widths: &[u32]| Turns::of(stripe, widths.len());
         let wide = widths.iter().chain(profile.s2mm_widths).all(|width| beat_cycles(*width) == 1);
         let bodies = of(&velocities, widths)
@@ -95,10 +100,25 @@ impl Layout {
             share,
             places,
             in_place,
+            warm_share,
             bodies,
             velocity_rows,
         })
     }
+}
+
+/// Beats on each stream of a collision with its impulses, if the collision lies on the streams as in the
+/// other passes, the impulses lie behind it, and it comes in an interval.
+fn warm_share(stripe: &Stripe, widths: &[u32], interval: u64) -> Option<PerStream> {
+    const BEATS: usize = collision::WARM_ROWS;
+    let striping = Striping::new(stripe, widths);
+    let mut walk = striping.places(0);
+    let mut places = [(0, 0); BEATS];
+    places.fill_with(|| walk.take());
+    let [record @ .., impulses] = places;
+    let known = record == batch::PLACES && impulses == batch::IMPULSES;
+    let whole = BEATS.is_multiple_of(stripe.streams.len());
+    (known && whole && striping.cycles(BEATS) <= interval).then(|| striping.counts(BEATS))
 }
 
 #[cfg(test)]
@@ -115,9 +135,9 @@ mod tests {
         let float = layout(&FLOAT).expect("it has short cuts");
         assert!(float.in_place);
         assert_eq!(float.bodies, Some(Turns { streams: 4 }));
-        assert_eq!(float.share, [2, 2, 2, 1]);
+        assert_eq!((float.share, float.warm_share), ([2, 2, 2, 1], Some([2; 4])));
         let mixed = layout(&MIXED).expect("it has short cuts");
-        assert!(!mixed.in_place);
+        assert!(!mixed.in_place && mixed.warm_share.is_none());
         assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
         assert_eq!(mixed.share, [1, 1, 1, 0]);
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
@@ -189,6 +209,18 @@ mod tests {
         }
         static ACROSS: Profile = striped(&[0, 1], MIXED);
         static WITHOUT: Profile = striped(&[0, 1, 0], MIXED);
+        // A step with impulses alone does, where these lie elsewhere or make a record too long.
+        const fn warm(streams: &'static [u8], interval: u32) -> Profile {
+            let stripe = Stripe { streams, padded: false };
+            let stripes = FLOAT.stripes.with_warm_collisions(stripe);
+            Profile { stripes, initiation_interval: interval, ..FLOAT }
+        }
+        static BEFORE: Profile = warm(&[3, 0, 1, 2], 2);
+        static LONG: Profile = warm(&[0, 1, 2, 3], 1);
+        for profile in [&BEFORE, &LONG] {
+            let layout = layout(profile).expect("its collisions have short cuts");
+            assert_eq!(layout.warm_share, None);
+        }
         static OTHER: Profile = striped(&[0, 1, 2, 3, 2, 1, 0], FLOAT);
         for profile in [&ACROSS, &WITHOUT, &OTHER] {
             assert!(layout(profile).is_none(), "{:?}", profile.stripes.collisions);

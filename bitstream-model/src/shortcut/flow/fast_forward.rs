@@ -11,10 +11,11 @@ use crate::accelerator::records::segment::Segment;
 use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX};
 use crate::board::short_cut::{ShortCut, Stretch};
 use crate::memory::Source;
-use crate::shortcut::deferred::{Ahead, BodyRows, Coming, Deferred};
+use crate::shortcut::deferred::{BodyRows, Coming, Deferred};
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::record::velocity;
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Where the next beats of each input are, the ones in its FIFO before the ones about to come, and
 /// how many.
@@ -24,13 +25,23 @@ type Sources = [(Source, usize); STREAMS_MAX];
 #[derive(Debug)]
 pub(crate) struct FastForward {
     deferred: Deferred,
-    /// The recorded flow of the collisions.
-    periods: Periods,
+    periods: PerPass,
+}
+
+/// The recorded flows of the collisions, of each kind of pass.
+#[derive(Debug)]
+struct PerPass {
+    usual: Periods,
+    /// With impulses that come in.
+    warm: Periods,
+    /// With impulses that go out.
+    sending: Periods,
 }
 
 impl FastForward {
     pub(crate) fn new(deferred: Deferred) -> Self {
-        Self { deferred, periods: Periods::new() }
+        let [usual, warm, sending] = [(); 3].map(|()| Periods::new());
+        Self { deferred, periods: PerPass { usual, warm, sending } }
     }
 }
 
@@ -113,14 +124,20 @@ fn coming(Stretch { now, cores, memory, .. }: &Stretch<'_>) -> Option<Coming> {
 /// Lets the collisions of a pass flow; returns the cycles that have passed.
 fn collisions(
     deferred: &mut Deferred,
-    periods: &mut Periods,
+    periods: &mut PerPass,
     mut stretch: Stretch<'_>,
     number: u32,
     mut segment: Segment,
 ) -> Option<u64> {
     let now = stretch.now;
-    if !outputs_rest(&stretch) || !deferred.takes_collisions() {
+    let arguments = &stretch.accelerator.arguments;
+    let (warm, sends) = (arguments.is_warm(number), arguments.sends_impulses(number));
+    if !deferred.takes_collisions() || !sends && !outputs_rest(&stretch) {
         return None;
+    }
+    let mut writes = [(0, 0); STREAMS_MAX];
+    if sends {
+        writes[IMPULSES_STREAM] = impulses_leave(&stretch)?;
     }
     let coming = coming(&stretch)?;
     let Stretch { accelerator, inputs, memory, .. } = &mut stretch;
@@ -130,25 +147,59 @@ fn collisions(
         Limits { cycles: stretch.until - now, records: ahead.issues, beats: PerEngine::default() };
     for (k, beats) in coming.iter().enumerate() {
         limits.beats[2 * k] = beats.map_or(0, |(_, beats)| beats);
+        limits.beats[2 * k + 1] = writes[k].1;
     }
     let mut flow = begin(&stretch, limits);
-    let Ahead { last, .. } = ahead;
     let accelerator = &mut *stretch.accelerator;
-    let mut issues = Issues { accelerator, deferred, ahead, done: segment.done };
-    match last {
-        Some(last) => flow.run_evenly(&mut issues, last, periods),
-        None => flow.run(&mut issues),
+    let done = segment.done;
+    if sends {
+        let issues = Issues::<true> { accelerator, deferred, ahead, done };
+        run(&mut flow, issues, &mut periods.sending);
+    } else {
+        let issues = Issues::<false> { accelerator, deferred, ahead, done };
+        run(&mut flow, issues, if warm { &mut periods.warm } else { &mut periods.usual });
     }
     let Flowed { cycles, waits, records, .. } = flow.flowed;
     if cycles == 0 {
         return None;
     }
+    if sends {
+        let Stretch { accelerator, outputs, memory, .. } = &mut stretch;
+        writes[IMPULSES_STREAM].1 = flow.flowed.beats[2 * IMPULSES_STREAM + 1];
+        let (_, mut places) = memory.lend(Sources::default(), writes)?;
+        let place = std::mem::take(&mut places[IMPULSES_STREAM]);
+        deferred.pass_over_impulses(accelerator, number, (done, records), outputs, place);
+    }
     pass_cores(&mut stretch, &flow);
     let Stretch { accelerator, inputs, .. } = stretch;
     pass_inputs(inputs, &flow, &coming);
-    deferred.pass_over_issues(accelerator, &mut segment, records, inputs);
+    deferred.pass_over_issues(accelerator, number, &mut segment, records, inputs);
     accelerator.pass_over(cycles, waits, Phase::Pass { number, segment });
     Some(cycles)
+}
+
+/// Lets the issues of a pass flow.
+fn run<const IMPULSES: bool>(
+    flow: &mut Flow,
+    mut issues: Issues<'_, IMPULSES>,
+    periods: &mut Periods,
+) {
+    match issues.ahead.last {
+        Some(last) => flow.run_evenly(&mut issues, last, periods),
+        None => flow.run(&mut issues),
+    }
+}
+
+/// Where the next impulses go, and for how many there is room, if nothing happens on the outputs but that
+/// these leave.
+fn impulses_leave(stretch: &Stretch<'_>) -> Option<(u64, usize)> {
+    let Stretch { now, cores, outputs, memory, .. } = stretch;
+    let others = || (0..cores.len()).filter(|k| *k != IMPULSES_STREAM);
+    let rest = others().all(|k| {
+        outputs.get(k).is_none_or(|output| output.len() == 0) && cores[k].rests_without_beats(*now)
+    });
+    let (at, beats) = cores[IMPULSES_STREAM].undisturbed(Direction::S2mm, *now)?;
+    (rest && memory.may_write(at, beats)).then_some((at, beats))
 }
 
 /// Lets bodies flow, which are loaded, or integrated with these results; returns the cycles that
@@ -232,7 +283,7 @@ fn bodies(
     Some(cycles)
 }
 
-/// Lets bodies of that many rows flow on that many streams.
+/// Lets bodies of `rows` rows each flow on `STREAMS` streams.
 fn flow_of<const STREAMS: usize>(flow: &mut Flow, done: usize, rows: usize, results: bool) {
     match (rows, results) {
         (_, true) => flow.run(&mut Bodies::<STREAMS, ROWS_IN, true> { done }),

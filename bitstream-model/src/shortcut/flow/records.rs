@@ -4,6 +4,7 @@ use super::PerEngine;
 use crate::accelerator::Accelerator;
 use crate::accelerator::records::striping::{PerStream, ROWS_OUT, STREAMS_MAX, Turns};
 use crate::shortcut::deferred::{Ahead, Deferred};
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Records that flow one after the other: the bodies of a phase, or the issues of a pass. They are
 /// numbered from the first one of the flow.
@@ -25,9 +26,9 @@ pub(super) trait Records {
     fn enter(&mut self, first: usize, records: usize, cycles: u64) -> u64;
 }
 
-/// The issues of a pass.
+/// The issues of a pass, whose impulses may go out.
 #[derive(Debug)]
-pub(super) struct Issues<'a> {
+pub(super) struct Issues<'a, const IMPULSES: bool> {
     pub(super) accelerator: &'a mut Accelerator,
     pub(super) deferred: &'a mut Deferred,
     pub(super) ahead: Ahead,
@@ -46,12 +47,16 @@ pub(super) fn issues_held(share: &PerStream, held: &PerEngine) -> usize {
     issues
 }
 
-impl Records for Issues<'_> {
-    const RESULTS: bool = false;
+impl<const IMPULSES: bool> Records for Issues<'_, IMPULSES> {
+    const RESULTS: bool = IMPULSES;
 
     #[inline(always)]
-    fn ready(&self, _first: usize, held: &PerEngine, _depth: usize) -> usize {
-        issues_held(&self.ahead.share, held)
+    fn ready(&self, _first: usize, held: &PerEngine, depth: usize) -> usize {
+        let issues = issues_held(&self.ahead.share, held);
+        if !IMPULSES {
+            return issues;
+        }
+        issues.min(depth - held[2 * IMPULSES_STREAM + 1])
     }
 
     #[inline(always)]
@@ -61,7 +66,11 @@ impl Records for Issues<'_> {
 
     #[inline(always)]
     fn beats(&self, _first: usize, records: usize) -> (PerStream, PerStream) {
-        (self.ahead.share.map(|share| records * share), [0; STREAMS_MAX])
+        let mut given = [0; STREAMS_MAX];
+        if IMPULSES {
+            given[IMPULSES_STREAM] = records;
+        }
+        (self.ahead.share.map(|share| records * share), given)
     }
 
     #[inline(always)]
@@ -71,7 +80,7 @@ impl Records for Issues<'_> {
     }
 }
 
-/// Bodies of that many rows that are loaded, or leave with their results, on streams that take turns. The
+/// Bodies of `ROWS` rows each that are loaded, or leave with their results, on streams that take turns. The
 /// number of streams divides every count of beats: it is a constant.
 #[derive(Debug)]
 pub(super) struct Bodies<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> {
