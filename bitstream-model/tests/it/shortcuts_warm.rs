@@ -1,6 +1,8 @@
 //! Impulses come in and go out with short cuts as without: a pass brings the same collisions from other
 //! buffers, and impulses leave in the middle of a pass.
 
+use std::cell::Cell;
+
 use bitstream_model::{BoardConfig, DeviceAccess, FaultPlan};
 use pgs_interface::profile::{FLOAT, Inertia};
 use pgs_interface::record::Beat;
@@ -29,6 +31,54 @@ fn config(inertia: Inertia) -> BoardConfig {
 
 fn lanes(config: BoardConfig, step: &Step) -> Vec<Lane> {
     step.packed(&config.variant())
+}
+
+thread_local! {
+    /// How often a board that this thread runs has gone the long way for the rest of a step.
+    static LONG_WAYS: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Counts the messages of boards that go the long way for the rest of a step.
+struct Counter;
+
+impl log::Log for Counter {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.target().ends_with("deferred::passes")
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        let counts = self.enabled(record.metadata());
+        if counts && record.args().to_string().contains("brings other beats") {
+            LONG_WAYS.set(LONG_WAYS.get() + 1);
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+#[test]
+fn steps_with_impulses_take_the_short_cuts_to_their_end() {
+    log::set_logger(&Counter).expect("no other test has a logger");
+    log::set_max_level(log::LevelFilter::Debug);
+    for (extensions, inertia) in
+        (0..8).flat_map(|bits| [Inertia::Isotropic, Inertia::World].map(|of| (bits, of)))
+    {
+        let step = extended(large(), extensions, 7, &FLOAT);
+        for length_width in [14, 26] {
+            let mut machine = Machine::new(BoardConfig { length_width, ..config(inertia) });
+            for _ in 0..2 {
+                machine.step(&step).expect("no fault");
+            }
+            assert_eq!(LONG_WAYS.get(), 0, "{extensions:b} {inertia:?} {length_width}");
+        }
+    }
+    // And a step that cannot.
+    let step = warm(large());
+    let mut changed = lanes(config(Inertia::World), &step);
+    changed[STREAM].segments[WARM[1]][0].0[1] ^= 1;
+    let mut machine = Machine::new(config(Inertia::World));
+    machine.step_with(&step, &changed).expect("no fault");
+    assert_eq!(LONG_WAYS.get(), 1);
 }
 
 fn outcome(seen: &Seen) -> (Vec<[[u32; 4]; 4]>, Vec<Beat>) {

@@ -1,10 +1,12 @@
 //! Takes the impulses that come in with the collisions of a warm pass, and gives out the ones that a kind of
 //! passes ends with.
 
-use super::block::{LANES, Words};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use super::block::{Block, LANES, Words};
 use super::{Batch, NO_SLOT};
 use pgs_interface::record::{Beat, CONTACT_POINTS};
-use pgs_support::lanes::{Instructions, Quad, Work};
+use pgs_support::lanes::{F32x16, Instructions, Quad, Work};
 
 /// Friction impulses of a collision.
 const FRICTION: usize = 2;
@@ -36,8 +38,10 @@ impl Given {
     }
 }
 
-/// The slots of sixteen collisions, if these fill a block in their order.
-fn whole_block(slots: &[u32; LANES]) -> Option<usize> {
+/// The block that the next sixteen collisions fill in their order, if they do.
+#[inline(always)]
+fn whole_block(slots: &[u32]) -> Option<usize> {
+    let slots: &[u32; LANES] = slots.get(..LANES)?.try_into().ok()?;
     let [first, ..] = *slots;
     // `NO_SLOT` is no multiple.
     let begins = (first as usize).is_multiple_of(LANES);
@@ -50,17 +54,21 @@ struct Give<'a> {
     contact: bool,
     pairs: &'a [[Beat; 2]],
     slots: &'a [u32],
+    /// The blocks from number `first` on.
     given: &'a mut [Given],
+    first: usize,
     sums: &'a mut [u32],
 }
 
 impl Give<'_> {
+    #[inline(always)]
     fn one_by_one(self) {
-        let Self { contact, pairs, slots, given, sums } = self;
+        let Self { contact, pairs, slots, given, first, sums } = self;
         for (([_, beat], slot), sum) in pairs.iter().zip(slots).zip(sums) {
             *sum = beat.0.into_iter().fold(0, u32::wrapping_add);
             let (block, lane) = (*slot as usize / LANES, *slot as usize % LANES);
-            if let Some(given) = given.get_mut(block).filter(|_| *slot != NO_SLOT) {
+            let given = block.checked_sub(first).and_then(|block| given.get_mut(block));
+            if let Some(given) = given.filter(|_| *slot != NO_SLOT) {
                 for (words, word) in given.words(contact).iter_mut().zip(beat.0) {
                     words[lane] = f32::from_bits(word);
                 }
@@ -74,12 +82,17 @@ impl Work for Give<'_> {
 
     #[inline(always)]
     fn run(self, instructions: impl Instructions) {
-        let Self { contact, pairs, slots, given, sums } = self;
-        let groups = pairs.chunks(LANES).zip(slots.chunks(LANES)).zip(sums.chunks_mut(LANES));
-        for ((pairs, slots), sums) in groups {
-            let block = slots.try_into().ok().and_then(whole_block);
-            let Some(to) = block.and_then(|block| given.get_mut(block)) else {
-                Give { contact, pairs, slots, given: &mut *given, sums }.one_by_one();
+        let Self { contact, pairs, slots, given, first, sums } = self;
+        let mut at = 0;
+        while at < slots.len() {
+            let block = whole_block(&slots[at..]);
+            let to = block.and_then(|block| given.get_mut(block.checked_sub(first)?));
+            let count = if to.is_some() { LANES } else { 1 };
+            let (pairs, sums) = (&pairs[at..at + count], &mut sums[at..at + count]);
+            let slots = &slots[at..at + count];
+            at += count;
+            let Some(to) = to else {
+                Give { contact, pairs, slots, given: &mut *given, first, sums }.one_by_one();
                 continue;
             };
             let quads: &[Quad] = bytemuck::cast_slice(pairs);
@@ -94,6 +107,76 @@ impl Work for Give<'_> {
             }
         }
     }
+}
+
+/// Impulses that go out after the last pass of a kind: zeros for padding.
+struct Outgoing<'a> {
+    contact: bool,
+    slots: &'a [u32],
+    blocks: &'a [Block],
+    to: &'a mut [Beat],
+}
+
+impl Outgoing<'_> {
+    #[inline(always)]
+    fn one_by_one(self) {
+        let Self { contact, slots, blocks, to } = self;
+        for (beat, slot) in to.iter_mut().zip(slots) {
+            let (block, lane) = (*slot as usize / LANES, *slot as usize % LANES);
+            let block = blocks.get(block).filter(|_| *slot != NO_SLOT);
+            let words = match (contact, block.map(|block| block.impulses(lane))) {
+                (_, None) => [0.0; CONTACT_POINTS],
+                (true, Some(normal)) => normal,
+                (false, Some([_, first, second, _])) => [first, second, 0.0, 0.0],
+            };
+            *beat = Beat(words.map(f32::to_bits));
+        }
+    }
+}
+
+impl Work for Outgoing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, instructions: impl Instructions) {
+        let Self { contact, slots, blocks, to } = self;
+        let zero = F32x16::splat(0.0);
+        let mut at = 0;
+        while at < slots.len() {
+            let block = whole_block(&slots[at..]).and_then(|block| blocks.get(block));
+            let count = if block.is_some() { LANES } else { 1 };
+            let (slots, to) = (&slots[at..at + count], &mut to[at..at + count]);
+            at += count;
+            let Some(block) = block else {
+                Outgoing { contact, slots, blocks, to }.one_by_one();
+                continue;
+            };
+            let [a, b, c, d] = block.impulses.map(F32x16::from_array);
+            let columns = if contact { [a, b, c, d] } else { [b, c, zero, zero] };
+            instructions.store(columns, bytemuck::cast_slice_mut(to), 1);
+        }
+    }
+}
+
+/// The collisions whose impulses one thread takes or gives out at once.
+const OF_THREAD: usize = 128 * LANES;
+
+/// Neighbouring collisions, no two parts in the same block: how many, and the block behind theirs.
+fn parts(slots: &[u32]) -> impl Iterator<Item = (usize, usize)> {
+    let mut ends = Vec::new();
+    let (mut count, mut behind) = (0, 0);
+    for slots in slots.chunks(OF_THREAD) {
+        let used = || slots.iter().filter(|slot| **slot != NO_SLOT);
+        let first = used().min().map_or(behind, |slot| *slot as usize / LANES);
+        if first >= behind && count > 0 {
+            ends.push((count, behind));
+            count = 0;
+        }
+        count += slots.len();
+        behind = used().max().map_or(behind, |slot| behind.max(*slot as usize / LANES + 1));
+    }
+    ends.push((count, behind));
+    ends.into_iter()
 }
 
 impl Batch {
@@ -111,30 +194,39 @@ impl Batch {
             self.given.resize(blocks, Given::NONE);
         }
         let slots = &self.slots[first..first + pairs.len()];
-        let work = Give { contact, pairs, slots, given: &mut self.given, sums };
-        if let Err(work) = self.width.run(work) {
-            work.one_by_one();
-        }
+        let width = self.width;
+        // The parts that are left: their collisions and, from the one with that number on, their blocks.
+        let (mut pairs, mut left, mut sums) = (pairs, slots, sums);
+        let (mut given, mut begin) = (&mut self.given[..], 0);
+        let works = parts(slots).map(|(count, behind)| {
+            let (own, others) = std::mem::take(&mut given).split_at_mut(behind - begin);
+            let (of_pairs, other_pairs) = pairs.split_at(count);
+            let (of_slots, other_slots) = left.split_at(count);
+            let (of_sums, other_sums) = std::mem::take(&mut sums).split_at_mut(count);
+            (given, pairs, left, sums) = (others, other_pairs, other_slots, other_sums);
+            let first = std::mem::replace(&mut begin, behind);
+            Give { contact, pairs: of_pairs, slots: of_slots, given: own, first, sums: of_sums }
+        });
+        self.crew.each(works, |work| {
+            if let Err(work) = width.run(work) {
+                work.one_by_one();
+            }
+        });
     }
 
     /// The impulses of the collisions from `first` on as they go out after the last pass of a kind: zeros
     /// for padding. Returns the sum of their words.
-    pub(crate) fn outgoing(&self, contact: bool, first: usize, to: &mut [Beat]) -> u32 {
+    pub(crate) fn outgoing(&mut self, contact: bool, first: usize, to: &mut [Beat]) -> u32 {
         let slots = &self.slots[first..first + to.len()];
-        let mut sum = 0_u32;
-        for (beat, slot) in to.iter_mut().zip(slots) {
-            let mut words = [0; CONTACT_POINTS];
-            if *slot != NO_SLOT {
-                let (block, lane) = (*slot as usize / LANES, *slot as usize % LANES);
-                let impulses = self.blocks[block].impulses(lane);
-                words = match (contact, impulses) {
-                    (true, normal) => normal.map(f32::to_bits),
-                    (false, [_, first, second, _]) => [first.to_bits(), second.to_bits(), 0, 0],
-                };
+        let (blocks, width, sum) = (&self.blocks[..], self.width, AtomicU32::new(0));
+        let parts = slots.chunks(OF_THREAD).zip(to.chunks_mut(OF_THREAD));
+        self.crew.each(parts, |(slots, to)| {
+            if let Err(work) = width.run(Outgoing { contact, slots, blocks, to: &mut *to }) {
+                work.one_by_one();
             }
-            *beat = Beat(words);
-            sum = words.into_iter().fold(sum, u32::wrapping_add);
-        }
-        sum
+            let words = to.iter().flat_map(|beat| beat.0);
+            sum.fetch_add(words.fold(0, u32::wrapping_add), Ordering::Relaxed);
+        });
+        sum.into_inner()
     }
 }

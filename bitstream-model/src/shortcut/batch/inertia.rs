@@ -69,9 +69,12 @@ impl Form for World {
 
     #[inline(always)]
     fn about_axes<A: Arithmetic>(
-        [xx, yy, zz, _]: [Numbers<A>; 4],
-        [xy, xz, yz, _]: [Numbers<A>; 4],
+        [xx, yy, zz, zero]: [Numbers<A>; 4],
+        [xy, xz, yz, zero_too]: [Numbers<A>; 4],
     ) -> Columns<A> {
+        // Whole numbers of 0 change nothing; but where the last column is left unused, the compiler puts the
+        // others together word by word instead of row by row.
+        let (xx, xy) = (xx.with_words(zero), xy.with_words(zero_too));
         Columns([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     }
 

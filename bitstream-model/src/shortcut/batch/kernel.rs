@@ -6,11 +6,11 @@
 
 #![allow(unsafe_code, reason = "rows of velocities are shared by threads")]
 
-use super::Stage;
 use super::block::{Block, Words, kind};
 use super::given::Given;
 use super::inertia::{Form, Times};
 use super::numbers::{Arithmetic, Numbers};
+use super::plan::Stage;
 use super::vector::{Vector, add, cross, dot, either, neg, sub, times};
 use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;

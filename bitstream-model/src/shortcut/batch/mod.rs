@@ -16,9 +16,11 @@ mod given;
 mod grouping;
 mod inertia;
 mod kernel;
+mod line;
 mod motion;
 mod numbers;
 mod order;
+mod plan;
 mod queue;
 mod records;
 #[cfg(test)]
@@ -31,12 +33,12 @@ use std::ops::Range;
 
 use pgs_support::Crew;
 
-use crate::accelerator::arithmetic::inertia::{self as form, Isotropic, Stored, World};
-use crate::accelerator::arithmetic::number::{Format, Half, Single};
+use crate::accelerator::arithmetic::inertia::{Isotropic, World};
+use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::hazards::Entry;
-use crate::accelerator::per_record::fixed_impulse;
+#[cfg(test)]
 use crate::accelerator::records::decode::Collision;
-use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use crate::accelerator::solver::{Impulses, Velocity};
 use crate::config::THREADS_MAX;
 use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
@@ -47,11 +49,14 @@ use decode::{Group, PUT_OFF};
 use given::Given;
 use grouping::Places;
 use kernel::InertiaRow;
-use wavefront::{Fronts, Line, Passes};
+use line::Line;
+use plan::Stage;
+use wavefront::{Fronts, Passes};
 use width::Width;
 
 pub(crate) use convert::Translation;
 pub(crate) use motion::ResultPlaces;
+pub(crate) use plan::{Plan, Properties};
 pub(crate) use records::{IMPULSES, PLACES};
 
 /// The slot of a padding entry.
@@ -59,85 +64,6 @@ const NO_SLOT: u32 = u32::MAX;
 
 /// Bodies that a thread copies at once.
 const COPIED_TOGETHER: usize = 2048;
-
-/// The kind of a pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Stage {
-    contact: bool,
-    /// The last contact pass, which counts its impulses, or the first friction pass, which adds the
-    /// impulses of each collision.
-    turning: bool,
-    /// Given impulses take the place of the computed ones.
-    warm: bool,
-}
-
-/// The passes of a step, numbered from 0.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Plan<'a> {
-    /// How many are contact passes: the first ones.
-    pub(crate) contact: u32,
-    /// Whether impulses are given to the first pass of each kind.
-    pub(crate) warm: bool,
-    pub(crate) parameters: &'a SolverParameters,
-}
-
-impl Plan<'_> {
-    fn stage(&self, pass: u32) -> Stage {
-        let contact = pass < self.contact;
-        let turning = if contact { pass + 1 == self.contact } else { pass == self.contact };
-        Stage { contact, turning, warm: self.warm && (pass == 0 || pass == self.contact) }
-    }
-
-    /// Whether a pass damps spins.
-    fn damps(&self, pass: u32) -> bool {
-        pass >= self.contact && !self.stage(pass).warm
-    }
-}
-
-impl Stage {
-    /// The pass over one collision, which may have brought impulses; returns its share of the impulse
-    /// sum.
-    fn solve<F: Format, I: form::Inertia>(
-        self,
-        collision: &Collision,
-        parameters: &SolverParameters,
-        masses: &[Mass; 2],
-        velocities: &mut [Velocity; 2],
-        impulses: &mut Impulses,
-    ) -> u64 {
-        let given = self.warm.then_some(&collision.impulses);
-        if self.contact {
-            solver::contact::<F, F, I>(collision, parameters, masses, velocities, impulses, given);
-            return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
-        }
-        if self.turning {
-            *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
-        }
-        solver::friction::<F, F, I>(collision, parameters, masses, velocities, impulses, given);
-        0
-    }
-}
-
-/// The shapes, masses and inertias of the bodies of a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Properties<'a> {
-    pub(crate) shape_of: &'a [u8],
-    /// The mass properties of each shape.
-    pub(crate) masses: &'a [Mass],
-    /// With world inertia that of each body.
-    pub(crate) inertias: &'a [Stored],
-}
-
-impl Properties<'_> {
-    /// The mass properties of a body.
-    fn mass(&self, body: usize) -> Mass {
-        let mass = self.masses[usize::from(self.shape_of[body])];
-        match self.inertias.get(body) {
-            Some(inertia) => Mass { inverse_inertia: *inertia, ..mass },
-            None => mass,
-        }
-    }
-}
 
 /// The collisions of a step.
 #[derive(Debug)]

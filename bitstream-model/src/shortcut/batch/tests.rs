@@ -3,9 +3,11 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::accelerator::arithmetic::number::Number;
+use crate::accelerator::arithmetic::inertia::{Inertia as InertiaForm, Stored};
+use crate::accelerator::arithmetic::number::{Format, Number};
 use crate::accelerator::records::array::Row;
 use crate::accelerator::records::segment::PacketError;
+use crate::accelerator::solver::{self, Mass, SolverParameters};
 use crate::cast::register;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::StreamFormat;
@@ -165,7 +167,7 @@ impl Step {
         }
     }
 
-    fn expected_with<F: Format, I: form::Inertia>(
+    fn expected_with<F: Format, I: InertiaForm>(
         &self,
         contact: u32,
         passes: u32,
@@ -349,9 +351,9 @@ fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: 
     let mut found = step.velocities.clone();
     let halt = halt.min(passes);
     // The second time all at once, from the velocities before the passes on.
-    for parts in [&[0..halt, halt..passes][..], &[0..passes]] {
-        for part in parts {
-            batch.run(part.clone(), &step.plan(contact), step.properties(), &step.velocities);
+    for halt in [halt, passes] {
+        for part in [0..halt, halt..passes] {
+            batch.run(part, &step.plan(contact), step.properties(), &step.velocities);
         }
         batch.leave(&mut found);
         assert_eq!(velocity_bits(&found), velocity_bits(&expected));
@@ -359,14 +361,14 @@ fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: 
             assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
         }
         assert_eq!(batch.impulse_sum(), sum);
-        check_outgoing(&batch, &impulses);
+        check_outgoing(&mut batch, &impulses);
         batch.restart();
     }
     batch
 }
 
 /// Compares the impulses that go out after a pass of either kind.
-fn check_outgoing(batch: &Batch, impulses: &[Impulses]) {
+fn check_outgoing(batch: &mut Batch, impulses: &[Impulses]) {
     for contact in [true, false] {
         let mut beats = vec![Beat([7; 4]); impulses.len()];
         let sum = batch.outgoing(contact, 0, &mut beats);

@@ -17,18 +17,18 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
-use bytemuck::{Pod, Zeroable};
 use pgs_support::Crew;
 use pgs_support::lanes::{Instructions, Work, prefetch};
 
-use super::Plan;
 use super::block::{Block, LANES, kind};
 use super::given::Given;
 use super::grouping::Places;
 use super::inertia::Form;
-use super::kernel::{self, BodyRow, InertiaRow, Pass, Rows};
+use super::kernel::{self, InertiaRow, Pass, Rows};
+use super::line::Line;
 use super::numbers::Computed;
 use super::order::Order;
+use super::plan::Plan;
 use super::width::Width;
 use crate::accelerator::arithmetic::inertia::{Isotropic, World};
 use crate::accelerator::arithmetic::number::{Half, Single};
@@ -40,8 +40,8 @@ use pgs_interface::profile::Inertia;
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
-/// Passes that a thread takes at once.
-const BUNDLE: usize = 4;
+/// Passes that a thread takes at once, at most: the ones of a kind in a usual step with a warm start.
+const BUNDLE_MAX: usize = 5;
 /// Looks at another thread's front before the processor is given away.
 const SPINS: u32 = 200;
 
@@ -125,30 +125,6 @@ impl Fronts {
     }
 }
 
-/// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
-/// the angular velocity and the inverse inertia, if that is one number.
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C, align(64))]
-pub(crate) struct Line([BodyRow; 2]);
-
-impl Line {
-    pub(crate) fn put(&mut self, second: bool, velocity: &Velocity, mass: &Mass) {
-        let ([x, y, z], [p, q, r]) = (velocity.linear, velocity.angular);
-        let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
-        self.0[usize::from(second)] = row;
-    }
-
-    pub(crate) fn velocity(&self, second: bool) -> Velocity {
-        let [[x, y, z, _], [p, q, r, _]] = self.0[usize::from(second)];
-        Velocity { linear: [x, y, z], angular: [p, q, r] }
-    }
-
-    /// Whether a body moves.
-    pub(crate) fn moves(&self, second: bool) -> bool {
-        self.0[usize::from(second)][0][3] != 0.0
-    }
-}
-
 /// The state that the threads of a run share.
 struct Field<'a> {
     passes: Passes<'a>,
@@ -185,8 +161,9 @@ impl Drop for Breaks<'_> {
 
 impl Field<'_> {
     /// The impulses that a pass brings for a block.
-    fn given(&self, pass: &Pass<'_>, block: u32) -> Option<&Given> {
-        self.passes.given.get(block as usize).filter(|_| pass.stage.warm)
+    #[inline(always)]
+    fn given<const WARM: bool>(&self, block: u32) -> Option<&Given> {
+        if WARM { self.passes.given.get(block as usize) } else { None }
     }
 
     /// The work of a thread: takes passes while any are left, then helps.
@@ -224,8 +201,11 @@ impl Field<'_> {
         if self.next.load(Ordering::Relaxed) >= count {
             return 0..0;
         }
-        let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed).min(count);
-        first..(first + BUNDLE).min(count)
+        // As few bundles as possible, of about the same length; two threads take one each.
+        let least = if self.alone { 1 } else { 2 };
+        let bundle = count.div_ceil(count.div_ceil(BUNDLE_MAX).max(least));
+        let first = self.next.fetch_add(bundle, Ordering::Relaxed).min(count);
+        first..(first + bundle).min(count)
     }
 
     /// Whether a pass has come to its end.
@@ -286,20 +266,6 @@ impl Field<'_> {
 
     /// Runs a pass over a chunk that the pass before has left behind.
     fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
-        match (self.passes.precision, self.passes.inertia) {
-            (Precision::F32, Inertia::Isotropic) => {
-                self.chunk_in::<Single, Isotropic>(pass, chunk, thread);
-            }
-            (Precision::F32, Inertia::World) => {
-                self.chunk_in::<Single, World>(pass, chunk, thread);
-            }
-            // No layout has world inertia in sixteen bits.
-            (Precision::Binary16, _) => self.chunk_in::<Half, Isotropic>(pass, chunk, thread),
-        }
-    }
-
-    /// The same in a format, with a form of inertia.
-    fn chunk_in<F: Computed, I: Form>(&self, pass: usize, chunk: usize, thread: usize) {
         let number = self.passes.numbers.start + register(pass);
         let stage = self.passes.plan.stage(number);
         let pass = Pass {
@@ -308,10 +274,30 @@ impl Field<'_> {
             parameters: self.passes.plan.parameters,
             spare: 2 * (register(thread) + 1),
         };
+        match (self.passes.precision, self.passes.inertia, stage.warm) {
+            (Precision::F32, Inertia::Isotropic, false) => {
+                self.chunk_in::<Single, Isotropic, false>(pass, chunk);
+            }
+            (Precision::F32, Inertia::Isotropic, true) => {
+                self.chunk_in::<Single, Isotropic, true>(pass, chunk);
+            }
+            (Precision::F32, Inertia::World, false) => {
+                self.chunk_in::<Single, World, false>(pass, chunk);
+            }
+            (Precision::F32, Inertia::World, true) => {
+                self.chunk_in::<Single, World, true>(pass, chunk);
+            }
+            // No layout has world inertia or a warm start in sixteen bits.
+            (Precision::Binary16, ..) => self.chunk_in::<Half, Isotropic, false>(pass, chunk),
+        }
+    }
+
+    /// The same in a format, with a form of inertia, in a warm pass or another one.
+    fn chunk_in<F: Computed, I: Form, const WARM: bool>(&self, pass: Pass<'_>, chunk: usize) {
         let mut sum = 0;
         let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
         let format = PhantomData::<(F, I)>;
-        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum, format };
+        let work = ChunkWork::<F, I, WARM> { field: self, pass, blocks, sum: &mut sum, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
         }
@@ -323,7 +309,7 @@ impl Field<'_> {
 }
 
 /// A pass over the blocks of a chunk.
-struct ChunkWork<'a, F, I> {
+struct ChunkWork<'a, F, I, const WARM: bool> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
     blocks: &'a [u32],
@@ -331,21 +317,23 @@ struct ChunkWork<'a, F, I> {
     format: PhantomData<(F, I)>,
 }
 
-impl<F: Computed, I: Form> Work for ChunkWork<'_, F, I> {
+impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, instructions: impl Instructions) {
         for (at, &index) in self.blocks.iter().enumerate() {
-            if let Some(ahead) = self.blocks.get(at + 1) {
-                let ahead = self.field.blocks.wrapping_add(*ahead as usize);
-                prefetch(ahead);
+            if let Some(&ahead) = self.blocks.get(at + 1) {
+                prefetch(self.field.blocks.wrapping_add(ahead as usize));
+                if let Some(given) = self.field.given::<WARM>(ahead) {
+                    prefetch(given);
+                }
             }
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
-            let given = self.field.given(&self.pass, index);
+            let given = self.field.given::<WARM>(index);
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
                 // has the chunk, the rows of its bodies are its own: see `Sync`.
@@ -366,14 +354,14 @@ impl<F: Computed, I: Form> Work for ChunkWork<'_, F, I> {
     }
 }
 
-impl<F: Computed, I: Form> ChunkWork<'_, F, I> {
+impl<F: Computed, I: Form, const WARM: bool> ChunkWork<'_, F, I, WARM> {
     fn one_by_one(self) {
         for &index in self.blocks {
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
-            let given = self.field.given(&self.pass, index);
+            let given = self.field.given::<WARM>(index);
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
             // has the chunk, the rows of its bodies are its own: see `Sync`.
             let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };

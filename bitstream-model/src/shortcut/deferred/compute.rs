@@ -64,7 +64,7 @@ impl Deferred {
 
     /// Gives out the impulses of collisions from `first` on. Returns the sum of their words.
     fn impulses_to(
-        &self,
+        &mut self,
         accelerator: &Accelerator,
         pass: u32,
         first: usize,

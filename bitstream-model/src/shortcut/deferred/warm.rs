@@ -9,6 +9,8 @@
 //! So the passes of each kind have an origin of their own on that stream. Where the contact points have
 //! the same bytes as in the first pass, the collisions are the decoded ones.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::decode_once::{Decoded, Upcoming};
 use crate::accelerator::control::Arguments;
 use crate::accelerator::records::segment::Segment;
@@ -142,7 +144,13 @@ impl Decoded {
 
     /// How many collisions from `first` on have the contact points of the decoded ones: `beats` are
     /// `share` beats of each.
-    fn same_contacts(&self, first: usize, beats: &[Beat], share: usize, memory: &Memory) -> usize {
+    fn same_contacts(
+        &mut self,
+        first: usize,
+        beats: &[Beat],
+        share: usize,
+        memory: &Memory,
+    ) -> usize {
         let origin = &self.kinds[self.first as usize].origin;
         let of_first = self.share(self.first)[STREAM];
         let records = beats.len() / share;
@@ -151,9 +159,24 @@ impl Decoded {
         while same < records {
             let (count, source) = origin.piece(((first + same) * of_first) as u64, end as u64);
             let Some(decoded) = source.and_then(|source| memory.view(source, count)) else { break };
-            let pairs = beats[same * share..].chunks(share).zip(decoded.chunks(of_first));
-            let there = pairs.len();
-            let equal = pairs.take_while(|(beats, decoded)| beats[0] == decoded[0]).count();
+            let beats = &beats[same * share..];
+            // The first beat of a collision has the contact point.
+            let there = (beats.len() / share).min(decoded.len().div_ceil(of_first));
+            let differs = AtomicUsize::new(there);
+            let parts = (0..there).step_by(COMPARED_TOGETHER);
+            self.batch.share(parts, |from| {
+                let until = (from + COMPARED_TOGETHER).min(there);
+                let (beats, decoded) = (&beats[from * share..], &decoded[from * of_first..]);
+                let equal = match (share, of_first) {
+                    (1, BEATS) => equal::<1, BEATS>(beats, decoded, until - from),
+                    (BEATS, 1) => equal::<BEATS, 1>(beats, decoded, until - from),
+                    _ => equal::<BEATS, BEATS>(beats, decoded, until - from),
+                };
+                if from + equal < until {
+                    differs.fetch_min(from + equal, Ordering::Relaxed);
+                }
+            });
+            let equal = differs.into_inner();
             same += equal;
             if equal < there || there == 0 {
                 break;
@@ -161,6 +184,20 @@ impl Decoded {
         }
         same
     }
+}
+
+/// Collisions that a thread compares at once.
+const COMPARED_TOGETHER: usize = 2048;
+
+/// How many of the first `count` collisions have the same first beat, of `A` and of `B` beats each.
+fn equal<const A: usize, const B: usize>(a: &[Beat], b: &[Beat], count: usize) -> usize {
+    let first = |at: usize| a.get(at * A).zip(b.get(at * B));
+    let same = |at: usize| first(at).is_some_and(|(a, b)| a == b);
+    // Most often all are; without a branch for each the compiler vectorises it.
+    if (0..count).fold(true, |all, at| all & same(at)) {
+        return count;
+    }
+    (0..count).take_while(|at| same(*at)).count()
 }
 
 /// Gathers beats of one collision, each from where it lies.

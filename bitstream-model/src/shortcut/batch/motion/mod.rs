@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::Batch;
 use super::block::{LANES, ROWS_APART};
-use super::wavefront::Line;
+use super::line::Line;
 use super::width::Width;
 use crate::accelerator::arithmetic::number::Single;
 use crate::accelerator::integrate::{Integration, integrate};
