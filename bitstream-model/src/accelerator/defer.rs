@@ -33,9 +33,10 @@ pub(crate) trait Defer: fmt::Debug + Send {
     /// A pass begins, with a hazard window of `slots` issue slots.
     fn begin_pass(&mut self, slots: u64);
 
-    /// Takes collisions of a pass for up to `limit` cycles: the next ones of `segment`. Returns the
-    /// cycles that they take to enter, stalls included. `None` if it takes no more collisions of
-    /// this step: the accelerator computes them from the next one of `segment` on.
+    /// Takes collisions of a pass for up to `limit` cycles: the next ones of `segment`. Where their
+    /// impulses go out, these fit into `outputs`. Returns the cycles that the collisions take to enter,
+    /// stalls included. `None` if it takes no more collisions of this step: the accelerator computes
+    /// them from the next one of `segment` on.
     fn collisions(
         &mut self,
         accelerator: &mut Accelerator,
@@ -43,6 +44,7 @@ pub(crate) trait Defer: fmt::Debug + Send {
         segment: &mut Segment,
         limit: u64,
         arrived: ArrivedRecords<'_>,
+        outputs: &mut [Stream],
     ) -> Result<Option<u64>, PacketError>;
 
     /// Computes everything deferred: the passes before `pass`, and the first `collisions` of `pass`.

@@ -99,7 +99,7 @@ pub(crate) struct Accelerator {
     pub(crate) velocities: Vec<Velocity>,
     pub(crate) shape_of: Vec<u8>,
     /// With world inertia, that of each body.
-    inertias: Vec<arithmetic::inertia::Stored>,
+    pub(crate) inertias: Vec<arithmetic::inertia::Stored>,
     pub(crate) impulses: Vec<Impulses>,
     window: Option<Box<window::Windowed>>,
 }

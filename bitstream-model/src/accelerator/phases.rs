@@ -186,7 +186,7 @@ impl Accelerator {
         let deferred = match deferral.as_deref_mut().filter(|defer| defer.takes_collisions()) {
             Some(defer) => {
                 let arrived = ArrivedRecords { records, inputs, memory };
-                defer.collisions(self, number, &mut segment, limit, arrived)?
+                defer.collisions(self, number, &mut segment, limit, arrived, outputs)?
             }
             None => None,
         };

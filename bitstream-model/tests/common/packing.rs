@@ -140,27 +140,53 @@ impl Step {
             .zip(&self.bodies)
             .flat_map(|(k, body)| velocity_rows(variant, self, body, k))
             .collect();
-        let mut collisions: Vec<Row> = self
-            .collisions
-            .iter()
-            .flat_map(|collision| collision_rows(variant, collision))
-            .collect();
+        let mut records: Vec<Vec<Row>> =
+            self.collisions.iter().map(|collision| collision_rows(variant, collision)).collect();
+        for (record, friction) in records.iter_mut().zip(&self.frictions) {
+            record[0][3] |= u32::from(f16::from_f32(*friction).to_bits()) << 16;
+        }
+        let mut collisions = records.concat();
         let issue = profile.collisions_per_issue as usize * variant.collision_rows();
         collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
         let poses: Vec<Row> =
             self.bodies.iter().flat_map(|body| pose_rows(numbers.poses, body)).collect();
-        let passes = (self.iterations[0] + self.iterations[1]) as usize;
         let stripes = &profile.stripes;
+        // The collisions with the impulses of a kind, where they have a stripe.
+        let with_impulses = |kind: usize| {
+            let impulses = self.impulses.iter().map(|impulses| impulses[kind].map(f32::to_bits));
+            let warm = records
+                .iter()
+                .zip(impulses)
+                .flat_map(|(record, row)| record.iter().copied().chain([row]).collect::<Vec<_>>());
+            let rows: Vec<Row> = warm.collect();
+            let stripe = stripes.warm_collisions.filter(|_| !rows.is_empty());
+            let none = || vec![Vec::new(); streams];
+            stripe.map_or_else(none, |stripe| {
+                deal(&stripe, streams, beats(numbers.collisions, &rows))
+            })
+        };
         let segments = [
             deal(&stripes.velocities, streams, beats(numbers.bodies, &velocities)),
             deal(&stripes.collisions, streams, beats(numbers.collisions, &collisions)),
             deal(&stripes.poses, streams, beats(numbers.poses, &poses)),
+            with_impulses(0),
+            with_impulses(1),
         ];
         (0..streams)
             .map(|stream| {
-                let segments = segments.each_ref().map(|segment| segment[stream].clone());
+                let mut segments = segments.each_ref().map(|segment| segment[stream].clone());
                 let mut packets = vec![0];
-                packets.extend((0..passes).map(|_| 1));
+                for (warm, passes) in [3, 4].into_iter().zip(self.iterations) {
+                    if passes > 0 && !self.impulses.is_empty() {
+                        // The same beats come from the same buffer.
+                        let same = segments[warm] == segments[1];
+                        packets.push(if same { 1 } else { warm });
+                    }
+                    if segments[warm] == segments[1] {
+                        segments[warm].clear();
+                    }
+                    packets.extend((0..passes).map(|_| 1));
+                }
                 packets.push(2);
                 packets.retain(|segment| !segments[*segment].is_empty());
                 Lane { segments, packets }
@@ -197,6 +223,19 @@ fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
     let cycles =
         beats.iter().zip(widths).map(|(beats, width)| *beats as u64 * 128 / u64::from(*width));
     cycles.max().expect("a profile has streams")
+}
+
+/// Beats of impulses that go out on the first stream.
+pub(crate) fn impulse_beats(step: &Step) -> usize {
+    let kinds = step.iterations.into_iter().filter(|passes| *passes > 0).count();
+    if step.impulses_out { kinds * step.collisions.len() } else { 0 }
+}
+
+/// Beats on each stream that a step gives out.
+pub(crate) fn beats_out(variant: &Variant, step: &Step) -> Vec<usize> {
+    let mut beats = result_beats(variant, step.bodies.len());
+    beats[0] += impulse_beats(step);
+    beats
 }
 
 /// Result beats on each stream.

@@ -1,7 +1,7 @@
 //! A step's input and output as plain numbers.
 
 use bitstream_model::estimate::StepShape;
-use pgs_interface::control;
+use pgs_interface::control::{self, flags};
 use pgs_interface::profile::{FLOAT, Variant};
 use pgs_interface::record::Beat;
 
@@ -50,6 +50,12 @@ pub(crate) struct Step {
     pub(crate) inertias: Vec<[f32; 6]>,
     pub(crate) bodies: Vec<Body>,
     pub(crate) collisions: Vec<Collision>,
+    /// The friction of each collision; without any, all have that of the step.
+    pub(crate) frictions: Vec<f32>,
+    /// The impulses of each collision, normal and of friction, that a warm start begins with; without
+    /// any there is none.
+    pub(crate) impulses: Vec<[[f32; 4]; 2]>,
+    pub(crate) impulses_out: bool,
     /// Contact and friction passes.
     pub(crate) iterations: [u32; 2],
     pub(crate) integrate: bool,
@@ -69,6 +75,9 @@ impl Step {
             inertias: Vec::new(),
             bodies,
             collisions,
+            frictions: Vec::new(),
+            impulses: Vec::new(),
+            impulses_out: false,
             iterations: [4, 4],
             integrate: true,
             time_step: 0.5,
@@ -138,7 +147,10 @@ impl Step {
         host.set_control(control::COLLISIONS, number(self.collisions.len()));
         host.set_control(control::CONTACT_ITERATIONS, self.iterations[0]);
         host.set_control(control::FRICTION_ITERATIONS, self.iterations[1]);
-        host.set_control(control::FLAGS, u32::from(self.integrate));
+        let word = flags::INTEGRATE.put(0, self.integrate.into());
+        let word = flags::PAIR_FRICTION.put(word, (!self.frictions.is_empty()).into());
+        let word = flags::WARM_START.put(word, (!self.impulses.is_empty()).into());
+        host.set_control(control::FLAGS, flags::IMPULSES_OUT.put(word, self.impulses_out.into()));
         let [x, y, z] = self.gravity;
         for (register, value) in [
             (control::TIME_STEP, self.time_step),
@@ -185,7 +197,9 @@ impl Step {
 /// One stream: its segments, and its packets as indices of segments.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lane {
-    pub(crate) segments: [Vec<Beat>; 3],
+    /// Velocities, collisions, poses; collisions with their normal impulses and with their friction
+    /// impulses, if these have other beats.
+    pub(crate) segments: [Vec<Beat>; 5],
     pub(crate) packets: Vec<usize>,
 }
 

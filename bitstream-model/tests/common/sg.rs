@@ -8,7 +8,7 @@ use pgs_interface::control::{self, ap_ctrl, irq};
 use pgs_interface::descriptor::status;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-use super::packing::{result_beats, unpack};
+use super::packing::{beats_out, result_beats, unpack};
 use super::ring::{EOF, Ring, SOF};
 use super::scene::{Body, Lane, Step};
 use super::windowed::design;
@@ -37,6 +37,8 @@ pub(crate) enum Failure {
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome {
     pub(crate) bodies: Vec<Body>,
+    /// The beats of impulses that went out.
+    pub(crate) impulses: Vec<Beat>,
     pub(crate) cycles: u64,
     pub(crate) stalls: u64,
     pub(crate) waits: u64,
@@ -214,17 +216,24 @@ impl Machine {
             host.take(*address);
             host.port.release(*address).expect("it was allocated");
         }
-        let streams: Vec<Box<[Beat]>> =
+        let mut streams: Vec<Box<[Beat]>> =
             flight.outputs.iter().map(|address| host.take(*address)).collect();
         for address in &flight.outputs {
             host.port.release(*address).expect("it was allocated");
         }
+        let sum_of_results =
+            streams.iter().fold(0, |sum, beats| super::scene::sum_words(sum, beats));
+        // They are in front of the results.
+        let results = result_beats(&host.variant(), bodies)[0];
+        let mut impulses = std::mem::take(&mut streams[0]).into_vec();
+        streams[0] = impulses.split_off(impulses.len() - results).into();
         let pair = |low, high| u64::from(host.control(low)) | (u64::from(host.control(high)) << 32);
         let cycles = pair(control::CYCLES_LO, control::CYCLES_HI);
         let work = u64::from(host.control(control::WORK_CYCLES));
         let waits = u64::from(host.control(control::WAIT_CYCLES));
         Outcome {
             bodies: unpack(&host.variant(), &streams, bodies),
+            impulses,
             cycles,
             // A board without power reads as all ones.
             stalls: cycles.wrapping_sub(work).wrapping_sub(waits),
@@ -233,9 +242,7 @@ impl Machine {
             sum_received: host.control(control::SUM_RECEIVED),
             sum_sent: host.control(control::SUM_SENT),
             impulse_sum: pair(control::IMPULSE_SUM_LO, control::IMPULSE_SUM_HI),
-            sum_of_results: streams
-                .iter()
-                .fold(0, |sum, beats| super::scene::sum_words(sum, beats)),
+            sum_of_results,
         }
     }
 
@@ -249,7 +256,7 @@ impl Machine {
     pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
         step.write_arguments(&self.host);
         let mut flight = Flight::default();
-        let beats = result_beats(&self.host.variant(), step.bodies.len());
+        let beats = beats_out(&self.host.variant(), step);
         self.arm(&mut flight, &beats);
         self.start();
         self.send(&mut flight, lanes);

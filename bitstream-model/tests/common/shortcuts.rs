@@ -7,7 +7,7 @@ use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use pgs_interface::record::Beat;
 use pgs_interface::stripe::{Stripe, Stripes};
 
-use super::packing::result_beats;
+use super::packing::beats_out;
 use super::ring::WHOLE;
 use super::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits};
 use super::sg::{Failure, Flight, Machine, Outcome};
@@ -58,8 +58,8 @@ const fn in_turn(streams: &'static [u8]) -> Stripes {
 }
 
 /// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of the received and sent
-/// words.
-pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2]);
+/// words; the impulses that went out.
+pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2], Vec<Beat>);
 
 /// Everything that a host can see of some steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +80,7 @@ pub(crate) fn visible(outcome: &Outcome) -> Visible {
         outcome.bodies.iter().map(bits).collect(),
         [cycles, stalls, waits, impulse_sum, outcome.hazards.into()],
         [outcome.sum_received, outcome.sum_sent],
+        outcome.impulses.clone(),
     )
 }
 
@@ -194,8 +195,13 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
             }),
         }
     };
+    let inertia = |k: u32| {
+        let of = |n: u64| unit(seed ^ 0x33, 8 * u64::from(k) + n);
+        [2.0 + of(0), 2.0 + of(1), 2.0 + of(2), of(3), of(4), of(5)]
+    };
     Step {
         shapes: vec![[0.0, 0.0], [1.0, 2.5], [0.25, 0.0]],
+        inertias: (0..bodies).map(inertia).collect(),
         time_step: 0.02,
         drift: 0.005,
         coefficient: 0.2,
@@ -218,6 +224,24 @@ pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
     step
 }
 
+/// The step with each extension of `float` whose bit is set: a friction for each collision, a warm start,
+/// impulses that go out. Another design takes the step as it is.
+pub(crate) fn extended(step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
+    if *profile != FLOAT {
+        return step;
+    }
+    let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
+    let has = |bit: u8| bits >> bit & 1 == 1;
+    let each = 0..step.collisions.len();
+    let impulses = |n| [0, 4].map(|k| [0, 1, 2, 3].map(|at| 0.1 * of(n, k + at)));
+    Step {
+        frictions: each.clone().filter(|_| has(0)).map(|n| 0.5 + 0.5 * of(n, 8)).collect(),
+        impulses: each.filter(|_| has(1)).map(impulses).collect(),
+        impulses_out: has(2),
+        ..step
+    }
+}
+
 pub(crate) fn below(random: u64, end: u32) -> u32 {
     u32::try_from(random % u64::from(end)).expect("less than the end")
 }
@@ -232,7 +256,7 @@ pub(crate) fn begin(
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
     let mut flight = Flight::default();
-    machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
+    machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     let mut addresses = Vec::new();
     for (stream, Lane { segments, packets }) in step.packed(&variant).iter().enumerate() {
@@ -258,7 +282,7 @@ pub(crate) fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
     let mut flight = Flight::default();
-    machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
+    machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     machine.send(&mut flight, &step.packed(&variant));
     flight

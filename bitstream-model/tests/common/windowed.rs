@@ -176,10 +176,13 @@ impl Step {
         let poses: Vec<_> =
             leave.iter().flat_map(|body| pose_rows(numbers.poses, &self.bodies[*body])).collect();
         let (stripes, streams) = (&profile.stripes, profile.mm2s_widths.len());
+        let none = || vec![Vec::new(); streams];
         let segments = [
             deal(&stripes.velocities, streams, beats(numbers.bodies, &velocities)),
             deal(&stripes.collisions, streams, beats(numbers.collisions, &collisions)),
             deal(&stripes.poses, streams, beats(numbers.poses, &poses)),
+            none(),
+            none(),
         ];
         let passes = self.passes() > 0;
         (0..streams)

@@ -17,4 +17,5 @@ mod registers;
 mod scatter_gather;
 mod shortcuts;
 mod shortcuts_buffers;
+mod shortcuts_warm;
 mod windowed;

@@ -3,13 +3,15 @@
 
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use pgs_interface::control;
-use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
 use proptest::prelude::*;
 
 use crate::common;
 use crate::common::scene::Step;
 use crate::common::sg::LONG;
-use crate::common::shortcuts::{OTHERS, begin, begin_once, below, same, scene, with_gaps};
+use crate::common::shortcuts::{
+    OTHERS, begin, begin_once, below, extended, same, scene, with_gaps,
+};
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (
@@ -30,12 +32,11 @@ fn config() -> impl Strategy<Value = BoardConfig> {
             ][..],
         ),
         prop::option::of(prop::sample::select(&[1_u32, 3, 20, 600][..])),
+        prop::sample::select(&[Inertia::Isotropic, Inertia::World][..]),
     )
-        .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots)| BoardConfig {
-            length_width,
-            bandwidth,
-            window_slots,
-            ..board(profile, fifo_beats)
+        .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots, inertia)| {
+            let usual = board(profile, fifo_beats);
+            BoardConfig { length_width, bandwidth, window_slots, inertia, ..usual }
         })
 }
 
@@ -61,9 +62,11 @@ proptest! {
         config in config(),
         (bodies, collisions, seed, apart) in (9..400_u32, 0..900_u32, any::<u64>(), any::<bool>()),
         iterations in iterations(),
+        extensions in any::<u8>(),
         spoilt in prop::option::weighted(0.3, (any::<u64>(), 0..5_u32)),
     ) {
-        let mut step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+        let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+        let mut step = extended(step, extensions, seed, config.profile);
         step.iterations = iterations;
         if let Some((at, how)) = spoilt.filter(|_| collisions > 0) {
             let collision = &mut step.collisions[below(at, collisions) as usize];
@@ -82,11 +85,12 @@ proptest! {
     fn a_step_of_many_bodies_is_the_same_with_short_cuts_and_without(
         config in config(),
         (bodies, collisions, seed) in (300..1500_u32, 0..40_u32, any::<u64>()),
-        integrate in prop::bool::weighted(0.8),
+        (integrate, extensions) in (prop::bool::weighted(0.8), any::<u8>()),
         spoilt in prop::option::weighted(0.3, (any::<u64>(), 3..600_u32)),
         pauses in prop::collection::vec(1..9000_u64, 0..4),
     ) {
-        let mut step = Step { integrate, ..scene(bodies, collisions, seed, true) };
+        let step = Step { integrate, ..scene(bodies, collisions, seed, true) };
+        let mut step = extended(step, extensions, seed, config.profile);
         if let Some((at, shape)) = spoilt {
             step.bodies[below(at, bodies) as usize].shape = shape;
         }
@@ -106,9 +110,9 @@ proptest! {
     fn a_step_with_faults_is_the_same_with_short_cuts_and_without(
         config in config(),
         scene in (9..100_u32, 1..400_u32, any::<u64>(), any::<bool>()),
-        iterations in iterations(),
+        (iterations, extensions) in (iterations(), any::<u8>()),
     ) {
-        step_with_faults(config, scene, iterations);
+        step_with_faults(config, scene, iterations, extensions);
     }
 
     #[test]
@@ -137,9 +141,10 @@ proptest! {
     fn a_host_that_looks_all_the_time_sees_the_same(
         config in config(),
         scene in (9..200_u32, any::<u64>(), any::<bool>()),
+        extensions in any::<u8>(),
         pauses in prop::collection::vec(1..4000_u64, 1..20),
     ) {
-        host_that_looks(config, scene, &pauses);
+        host_that_looks(config, scene, extensions, &pauses);
     }
 }
 
@@ -148,19 +153,31 @@ fn step_with_faults(
     config: BoardConfig,
     (bodies, collisions, seed, apart): (u32, u32, u64, bool),
     iterations: [u32; 2],
+    extensions: u8,
 ) {
     let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+    let step = extended(step, extensions, seed, config.profile);
     let step = Step { iterations, ..step };
     let plan = FaultPlan::random(seed, &config, iterations[0], iterations[1]);
     same(config, Some(&plan), 2, |machine| machine.step(&step));
 }
 
-/// One step of 500 collisions, during which the host reads registers after each pause, in ns.
-fn host_that_looks(config: BoardConfig, (bodies, seed, apart): (u32, u64, bool), pauses: &[u64]) {
+/// One step of 500 collisions, during which the host reads registers after each pause, in ns. Every pass
+/// has buffers of its own, or with bit 3 of the extensions the same ones as the others.
+fn host_that_looks(
+    config: BoardConfig,
+    (bodies, seed, apart): (u32, u64, bool),
+    extensions: u8,
+    pauses: &[u64],
+) {
     let step = with_gaps(scene(bodies, 500, seed, apart), seed, config.profile);
+    let step = extended(step, extensions, seed, config.profile);
     let config = BoardConfig { length_width: 26, ..config };
     let seen = same(config, None, 1, |machine| {
-        let (flight, _) = begin(machine, &step, |_, _, _| {});
+        let flight = match extensions >> 3 & 1 {
+            0 => begin(machine, &step, |_, _, _| {}).0,
+            _ => begin_once(machine, &step),
+        };
         for nanoseconds in pauses {
             machine.host.port.pause(std::time::Duration::from_nanos(*nanoseconds));
             machine.host.status(1, common::BOTH[0]);
@@ -176,17 +193,17 @@ fn host_that_looks(config: BoardConfig, (bodies, seed, apart): (u32, u64, bool),
 
 #[test]
 fn a_host_that_looks_after_a_nanosecond_sees_the_same() {
-    host_that_looks(board(&FLOAT, 16), (60, 0, false), &[1]);
+    host_that_looks(board(&FLOAT, 16), (60, 0, false), 0, &[1]);
 }
 
 #[test]
 fn a_fault_of_a_board_with_one_window_slot_is_the_same_with_short_cuts_and_without() {
     let config = BoardConfig { length_width: 10, window_slots: Some(1), ..board(&FLOAT, 16) };
-    step_with_faults(config, (35, 46, 987_651_107_387_363_228, false), [4, 4]);
+    step_with_faults(config, (35, 46, 987_651_107_387_363_228, false), [4, 4], 0);
 }
 
 #[test]
 fn a_fault_of_a_step_with_one_collision_is_the_same_with_short_cuts_and_without() {
     let config = BoardConfig { length_width: 10, ..board(&FLOAT, 16) };
-    step_with_faults(config, (12, 1, 6_219_227_694_810_742_345, false), [4, 4]);
+    step_with_faults(config, (12, 1, 6_219_227_694_810_742_345, false), [4, 4], 0);
 }

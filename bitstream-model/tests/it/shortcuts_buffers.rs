@@ -7,7 +7,7 @@ use pgs_interface::control;
 use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
 use pgs_interface::record::Beat;
 
-use crate::common::packing::result_beats;
+use crate::common::packing::beats_out;
 use crate::common::ring::WHOLE;
 use crate::common::scene::Lane;
 use crate::common::sg::{Failure, Flight, LONG};
@@ -193,12 +193,14 @@ fn a_buffer_that_changes_hands_in_the_middle_of_a_pass_is_noticed() {
                 let variant = machine.host.variant();
                 let mut flight = Flight::default();
                 step.write_arguments(&machine.host);
-                machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
+                machine.arm(&mut flight, &beats_out(&variant, &step));
                 machine.start();
                 let lanes = step.packed(&variant);
                 let mut addresses = Vec::new();
                 for (stream, Lane { segments, packets }) in lanes.iter().enumerate() {
-                    let buffers = segments.each_ref().map(|beats| machine.host.readable(beats));
+                    let there = segments.iter().filter(|beats| !beats.is_empty());
+                    let buffers: Vec<u64> =
+                        there.map(|beats| machine.host.readable(beats)).collect();
                     buffers.iter().for_each(|address| flight.input(*address));
                     let mut tail = 0;
                     for segment in packets {

@@ -145,6 +145,11 @@ impl Block {
         }
     }
 
+    /// Begins the passes again.
+    pub(crate) fn forget_impulses(&mut self) {
+        self.impulses = [[0.0; LANES]; CONTACT_POINTS];
+    }
+
     pub(crate) fn impulses(&self, lane: usize) -> Impulses {
         self.impulses.each_ref().map(|row| row[lane])
     }

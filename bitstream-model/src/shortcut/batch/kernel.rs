@@ -6,9 +6,12 @@
 
 #![allow(unsafe_code, reason = "rows of velocities are shared by threads")]
 
-use super::Stage;
 use super::block::{Block, Words, kind};
+use super::given::Given;
+use super::inertia::{Form, Times};
 use super::numbers::{Arithmetic, Numbers};
+use super::plan::Stage;
+use super::vector::{Vector, add, cross, dot, either, neg, sub, times};
 use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_support::lanes::{F32x16, Instructions, LANES, Mask, Quad};
@@ -17,54 +20,29 @@ use crate::accelerator::records::decode::pair_friction;
 use crate::accelerator::solver::SolverParameters;
 
 /// A body in memory: the linear velocity and the inverse mass, then the angular velocity
-/// and the inverse inertia.
+/// and the inverse inertia if that is one number.
 pub(crate) type BodyRow = [Quad; 2];
 
-type Vector<A> = [Numbers<A>; 3];
+/// The inverse inertia of a body about world axes: xx, yy, zz, then xy, xz, yz.
+pub(crate) type InertiaRow = [Quad; 2];
 
-#[inline(always)]
-fn add<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn sub<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn neg<A: Arithmetic>(a: Vector<A>) -> Vector<A> {
-    [-a[0], -a[1], -a[2]]
-}
-
-#[inline(always)]
-fn times<A: Arithmetic>(a: Vector<A>, s: Numbers<A>) -> Vector<A> {
-    [a[0] * s, a[1] * s, a[2] * s]
-}
-
-#[inline(always)]
-fn dot<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Numbers<A> {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross<A: Arithmetic>(a: Vector<A>, b: Vector<A>) -> Vector<A> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// `a` where the mask says yes, and `b` elsewhere.
-#[inline(always)]
-fn either<A: Arithmetic>(mask: Mask, a: Vector<A>, b: Vector<A>) -> Vector<A> {
-    [a[0].or(mask, b[0]), a[1].or(mask, b[1]), a[2].or(mask, b[2])]
+/// The rows of all bodies in memory.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rows {
+    pub(crate) bodies: *mut BodyRow,
+    /// With world inertia as many as bodies; else never read.
+    pub(crate) inertias: *const InertiaRow,
 }
 
 /// The bodies of one side.
 #[derive(Clone, Copy)]
-struct Side<A> {
+struct Side<A, K> {
     v: Vector<A>,
     m: Numbers<A>,
     w: Vector<A>,
-    k: Numbers<A>,
+    /// The number beside the angular velocity.
+    beside: Numbers<A>,
+    k: K,
 }
 
 /// One constraint row of each collision.
@@ -81,25 +59,25 @@ struct Row<A> {
 
 impl<A: Arithmetic> Row<A> {
     #[inline(always)]
-    fn new(
+    fn new<K: Times<A>>(
         minus_one: Numbers<A>,
         direction: Vector<A>,
         arm_a: Vector<A>,
         arm_b: Vector<A>,
-        a: &Side<A>,
-        b: &Side<A>,
+        a: &Side<A, K>,
+        b: &Side<A, K>,
     ) -> Self {
         let moment_a = cross(arm_a, direction);
         let moment_b = neg(cross(arm_b, direction));
-        let spin_a = times(moment_a, a.k);
-        let spin_b = times(moment_b, b.k);
+        let spin_a = a.k.times(moment_a);
+        let spin_b = b.k.times(moment_b);
         let denominator = ((a.m + dot(spin_a, moment_a)) + b.m) + dot(spin_b, moment_b);
         let jacobian = minus_one / denominator;
         Self { direction, moment_a, moment_b, spin_a, spin_b, jacobian }
     }
 
     #[inline(always)]
-    fn speed(&self, a: &Side<A>, b: &Side<A>) -> Numbers<A> {
+    fn speed<K>(&self, a: &Side<A, K>, b: &Side<A, K>) -> Numbers<A> {
         ((dot(self.direction, a.v) + dot(self.moment_a, a.w)) + dot(neg(self.direction), b.v))
             + dot(self.moment_b, b.w)
     }
@@ -107,13 +85,13 @@ impl<A: Arithmetic> Row<A> {
     /// Applies an impulse where `active`; `pushes` are the products of the direction (of its
     /// opposite for B) and the inverse masses.
     #[inline(always)]
-    fn apply(
+    fn apply<K>(
         &self,
         impulse: Numbers<A>,
         active: Option<Mask>,
         [push_a, push_b]: [Vector<A>; 2],
-        a: &mut Side<A>,
-        b: &mut Side<A>,
+        a: &mut Side<A, K>,
+        b: &mut Side<A, K>,
     ) {
         let before = (a.v, a.w, b.v, b.w);
         a.v = add(a.v, times(push_a, impulse));
@@ -172,28 +150,52 @@ fn tested(block: &Block, bit: u32) -> Mask {
     Mask::from_fn(|lane| block.kind[lane] & bit != 0)
 }
 
+/// Reads rows, by words.
+///
+/// # Safety
+///
+/// `rows` are indices into the rows at `from`, and no other thread writes these rows at the same time.
+#[inline(always)]
+unsafe fn gathered(
+    instructions: impl Instructions,
+    from: *const [Quad; 2],
+    rows: &Words<u32>,
+) -> [[F32x16; 4]; 2] {
+    let (mut first, mut second) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+    for (lane, row) in rows.iter().enumerate() {
+        // SAFETY: the caller promises that the index lies within the rows at `from`.
+        let row = unsafe { from.add(*row as usize) };
+        // SAFETY: the row exists, and the caller promises that no other thread writes it.
+        [first[lane], second[lane]] = unsafe { *row };
+    }
+    [instructions.columns(first), instructions.columns(second)]
+}
+
 /// Reads the bodies of one side.
 ///
 /// # Safety
 ///
-/// `rows` are indices into the rows at `bodies`, and no other thread writes these rows at the same time.
+/// `indices` are indices into the rows of all bodies, and no other thread writes these rows at the same
+/// time.
 #[inline(always)]
-unsafe fn side<A: Arithmetic>(
+unsafe fn side<A: Arithmetic, F: Form>(
     arithmetic: A,
     instructions: impl Instructions,
-    bodies: *const BodyRow,
-    rows: &Words<u32>,
-) -> Side<A> {
-    let (mut linear, mut angular) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
-    for (lane, row) in rows.iter().enumerate() {
-        // SAFETY: the caller promises that the index lies within the rows at `bodies`.
-        let body = unsafe { bodies.add(*row as usize) };
-        // SAFETY: the row exists, and the caller promises that no other thread writes it.
-        [linear[lane], angular[lane]] = unsafe { *body };
-    }
-    let [x, y, z, m] = instructions.columns(linear).map(|numbers| arithmetic.of(numbers));
-    let [p, q, r, k] = instructions.columns(angular).map(|numbers| arithmetic.of(numbers));
-    Side { v: [x, y, z], m, w: [p, q, r], k }
+    rows: Rows,
+    indices: &Words<u32>,
+) -> Side<A, F::Side<A>> {
+    let of = |columns: [F32x16; 4]| columns.map(|numbers| arithmetic.of(numbers));
+    // SAFETY: the caller promises both for the rows of the bodies.
+    let [linear, angular] = unsafe { gathered(instructions, rows.bodies, indices) };
+    let ([x, y, z, m], [p, q, r, beside]) = (of(linear), of(angular));
+    let k = if F::ABOUT_AXES {
+        // SAFETY: the caller promises that every body has a row, and no thread writes an inertia.
+        let [diagonal, others] = unsafe { gathered(instructions, rows.inertias, indices) };
+        F::about_axes(of(diagonal), of(others))
+    } else {
+        F::isotropic(beside)
+    };
+    Side { v: [x, y, z], m, w: [p, q, r], beside, k }
 }
 
 /// Writes the bodies of one side, in the order of the lanes.
@@ -203,15 +205,15 @@ unsafe fn side<A: Arithmetic>(
 /// `rows` are indices into the rows at `bodies`, and no other thread accesses these rows at the same
 /// time.
 #[inline(always)]
-unsafe fn put_side<A: Arithmetic>(
+unsafe fn put_side<A: Arithmetic, K>(
     instructions: impl Instructions,
     bodies: *mut BodyRow,
     rows: &Words<u32>,
-    side: &Side<A>,
+    side: &Side<A, K>,
 ) {
     let ([x, y, z], [p, q, r]) = (side.v, side.w);
     let linear = instructions.quads([x, y, z, side.m].map(Numbers::lanes));
-    let angular = instructions.quads([p, q, r, side.k].map(Numbers::lanes));
+    let angular = instructions.quads([p, q, r, side.beside].map(Numbers::lanes));
     for (lane, row) in rows.iter().enumerate() {
         // SAFETY: the caller promises that the index lies within the rows at `bodies`.
         let body = unsafe { bodies.add(*row as usize) };
@@ -220,31 +222,33 @@ unsafe fn put_side<A: Arithmetic>(
     }
 }
 
-/// One pass over the collisions of a block that is not serial. `bodies` are the rows of all bodies.
+/// One pass over the collisions of a block that is not serial. In a warm pass `given` takes the place of
+/// the impulses that the others compute.
 ///
 /// # Safety
 ///
-/// The block's rows and the spare one are indices into the rows at `bodies`. While this runs, no other thread writes the block's
-/// rows, and none reads the rows of its moving bodies or the spare one.
+/// The block's rows and the spare one are indices into `rows`. While this runs, no other thread writes the
+/// block's rows, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
-pub(crate) unsafe fn solve<A: Arithmetic>(
+pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     arithmetic: A,
     instructions: impl Instructions,
     pass: &Pass<'_>,
     block: &mut Block,
-    bodies: *mut BodyRow,
+    given: Option<&Given>,
+    rows: Rows,
 ) {
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = arithmetic.of(counts);
-    // SAFETY: the caller promises that the block's rows lie at `bodies`, and no other thread writes them.
-    let mut a = unsafe { side(arithmetic, instructions, bodies, &block.rows[0]) };
-    // SAFETY: the caller promises that the block's rows lie at `bodies`, and no other thread writes them.
-    let mut b = unsafe { side(arithmetic, instructions, bodies, &block.rows[1]) };
+    // SAFETY: the caller promises that the block's rows exist, and that no other thread writes them.
+    let mut a = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[0]) };
+    // SAFETY: the caller promises that the block's rows exist, and that no other thread writes them.
+    let mut b = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[1]) };
     if pass.stage.contact {
-        contact(arithmetic, pass, block, counts, &mut a, &mut b);
+        contact(arithmetic, pass, block, given, counts, &mut a, &mut b);
     } else {
-        friction(arithmetic, pass, block, counts, &mut a, &mut b);
+        friction(arithmetic, pass, block, given, counts, &mut a, &mut b);
     }
     for (each, side) in [a, b].iter().enumerate() {
         let mut written = block.rows[each];
@@ -253,9 +257,9 @@ pub(crate) unsafe fn solve<A: Arithmetic>(
                 *row = if kind & kind::MOVES[each] == 0 { pass.spare } else { *row };
             }
         }
-        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that they lie at
-        // `bodies`, and that no other thread accesses them.
-        unsafe { put_side(instructions, bodies, &written, side) };
+        // SAFETY: the rows are of moving bodies, or the spare one: the caller promises that they exist,
+        // and that no other thread accesses them.
+        unsafe { put_side(instructions, rows.bodies, &written, side) };
     }
 }
 
@@ -266,13 +270,14 @@ fn some(active: Mask) -> Option<Mask> {
 }
 
 #[inline(always)]
-fn contact<A: Arithmetic>(
+fn contact<A: Arithmetic, K: Times<A>>(
     arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
+    given: Option<&Given>,
     counts: Numbers<A>,
-    a: &mut Side<A>,
-    b: &mut Side<A>,
+    a: &mut Side<A, K>,
+    b: &mut Side<A, K>,
 ) {
     let zero = arithmetic.splat(0.0);
     let minus_one = arithmetic.splat(-1.0);
@@ -291,10 +296,14 @@ fn contact<A: Arithmetic>(
         let row = Row::new(minus_one, n, arms.0, arms.1, a, b);
         let reached = counts.above(arithmetic.splat(k as f32));
         let active = some(reached.without(row.jacobian.is_zero()));
-        let bias = ((distance + drift) * coefficient) * per_second;
-        let wanted = (row.speed(a, b) + bias) * row.jacobian;
         let before = arithmetic.load(&block.impulses[k]);
-        let after = (before + wanted).larger(zero);
+        let after = if let Some(given) = given {
+            arithmetic.load(&given.normal[k])
+        } else {
+            let bias = ((distance + drift) * coefficient) * per_second;
+            let wanted = (row.speed(a, b) + bias) * row.jacobian;
+            (before + wanted).larger(zero)
+        };
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
@@ -305,13 +314,14 @@ fn contact<A: Arithmetic>(
 }
 
 #[inline(always)]
-fn friction<A: Arithmetic>(
+fn friction<A: Arithmetic, K: Times<A>>(
     arithmetic: A,
     pass: &Pass<'_>,
     block: &mut Block,
+    given: Option<&Given>,
     counts: Numbers<A>,
-    a: &mut Side<A>,
-    b: &mut Side<A>,
+    a: &mut Side<A, K>,
+    b: &mut Side<A, K>,
 ) {
     let one = arithmetic.splat(1.0);
     let minus_one = arithmetic.splat(-1.0);
@@ -351,9 +361,13 @@ fn friction<A: Arithmetic>(
     for (k, t) in tangents.into_iter().enumerate() {
         let row = Row::new(minus_one, t, arm_a, arm_b, a, b);
         let active = some(taken.without(row.jacobian.is_zero()));
-        let wanted = row.speed(a, b) * row.jacobian;
         let before = arithmetic.load(&block.impulses[1 + k]);
-        let after = (before + wanted).larger(-limit).smaller(limit);
+        let after = if let Some(given) = given {
+            arithmetic.load(&given.friction[k])
+        } else {
+            let wanted = row.speed(a, b) * row.jacobian;
+            (before + wanted).larger(-limit).smaller(limit)
+        };
         let stored = match active {
             None => after,
             Some(active) => after.or(active, before),
@@ -361,6 +375,9 @@ fn friction<A: Arithmetic>(
         stored.store(&mut block.impulses[1 + k]);
         let pushes = [times(t, a.m), times(neg(t), b.m)];
         row.apply(after - before, active, pushes, a, b);
+    }
+    if given.is_some() {
+        return;
     }
     let spins = if pass.finds {
         let apart = unit(arithmetic, sub(position_b, position_a));

@@ -6,21 +6,26 @@
 //! ```
 //!
 //! Only collisions that share no moving body change places, so that every bit is that of
-//! `solver.rs` taking one after the other. It is for arithmetic in f32 or in binary16, with isotropic
-//! inertia and subnormals kept.
+//! `solver.rs` taking one after the other. It is for arithmetic in f32 with either form of inertia, or in
+//! binary16 with isotropic inertia, and for subnormals that are kept.
 
 mod block;
 mod convert;
 mod decode;
+mod given;
 mod grouping;
+mod inertia;
 mod kernel;
+mod line;
 mod motion;
 mod numbers;
 mod order;
+mod plan;
 mod queue;
 mod records;
 #[cfg(test)]
 mod tests;
+mod vector;
 mod wavefront;
 mod width;
 
@@ -28,74 +33,37 @@ use std::ops::Range;
 
 use pgs_support::Crew;
 
-use crate::accelerator::arithmetic::inertia::Isotropic;
-use crate::accelerator::arithmetic::number::{Format, Half, Single};
+use crate::accelerator::arithmetic::inertia::{Isotropic, World};
+use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::hazards::Entry;
-use crate::accelerator::per_record::fixed_impulse;
+#[cfg(test)]
 use crate::accelerator::records::decode::Collision;
-use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use crate::accelerator::solver::{Impulses, Velocity};
 use crate::config::THREADS_MAX;
 use pgs_interface::number::Precision;
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::CONTACT_POINTS;
 
 use block::{Block, LANES, ROWS_APART};
 use decode::{Group, PUT_OFF};
+use given::Given;
 use grouping::Places;
-use wavefront::{Fronts, Line, Passes};
+use kernel::InertiaRow;
+use line::Line;
+use plan::Stage;
+use wavefront::{Fronts, Passes};
 use width::Width;
 
 pub(crate) use convert::Translation;
 pub(crate) use motion::ResultPlaces;
-pub(crate) use records::PLACES;
+pub(crate) use plan::{Plan, Properties};
+pub(crate) use records::{IMPULSES, PLACES};
 
 /// The slot of a padding entry.
 const NO_SLOT: u32 = u32::MAX;
 
 /// Bodies that a thread copies at once.
 const COPIED_TOGETHER: usize = 2048;
-
-/// The kind of a pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Stage {
-    contact: bool,
-    /// The last contact pass, which counts its impulses, or the first friction pass, which adds the
-    /// impulses of each collision.
-    turning: bool,
-}
-
-impl Stage {
-    fn new(pass: u32, contact: u32) -> Self {
-        if pass < contact {
-            Self { contact: true, turning: pass + 1 == contact }
-        } else {
-            Self { contact: false, turning: pass == contact }
-        }
-    }
-
-    /// The pass over one collision; returns its share of the impulse sum.
-    fn solve<F: Format>(
-        self,
-        collision: &Collision,
-        parameters: &SolverParameters,
-        masses: &[Mass; 2],
-        velocities: &mut [Velocity; 2],
-        impulses: &mut Impulses,
-    ) -> u64 {
-        if self.contact {
-            solver::contact::<F, F, Isotropic>(
-                collision, parameters, masses, velocities, impulses, None,
-            );
-            return if self.turning { fixed_impulse::<F>(impulses) } else { 0 };
-        }
-        if self.turning {
-            *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
-        }
-        solver::friction::<F, F, Isotropic>(
-            collision, parameters, masses, velocities, impulses, None,
-        );
-        0
-    }
-}
 
 /// The collisions of a step.
 #[derive(Debug)]
@@ -109,6 +77,7 @@ pub(crate) struct Batch {
     width: Width,
     /// Precision of the arithmetic.
     precision: Precision,
+    inertia: Inertia,
     crew: Crew,
     fronts: Fronts,
     /// Whether the fronts are measured for all decoded collisions.
@@ -118,8 +87,12 @@ pub(crate) struct Batch {
     /// Number of bodies.
     bodies: usize,
     lines: Vec<Line>,
+    /// With world inertia a row for each row of the lines.
+    inertias: Vec<InertiaRow>,
     /// Whether the lines have the velocities of all bodies.
     entered: bool,
+    /// In a step with a warm start the impulses that came in, for each block.
+    given: Vec<Given>,
     /// Records that are put into their blocks when the threads have ended.
     put_off: Vec<Group>,
     /// Whether the records of the step have the friction of their pair above the contact count.
@@ -144,13 +117,16 @@ impl Batch {
             impulse_sum: 0,
             width,
             precision: Precision::F32,
+            inertia: Inertia::Isotropic,
             crew,
             fronts: Fronts::default(),
             measured: false,
             spins: false,
             bodies: 0,
             lines: Vec::new(),
+            inertias: Vec::new(),
             entered: false,
+            given: Vec::new(),
             put_off: Vec::with_capacity(PUT_OFF),
             pair_friction: false,
         }
@@ -161,6 +137,11 @@ impl Batch {
         self.precision = precision;
         self.places = Places::of_issues(together);
         self
+    }
+
+    /// Sets the form of inertia: world inertia in f32 alone.
+    pub(crate) fn with_inertia(self, inertia: Inertia) -> Self {
+        Self { inertia, ..self }
     }
 
     /// Begins a step: forgets the last step's collisions and makes room for `collisions`, which with
@@ -180,13 +161,23 @@ impl Batch {
         self.entered = false;
     }
 
+    /// Forgets the passes that were run: the next one begins with the velocities that are entered then.
+    pub(crate) fn restart(&mut self) {
+        let blocks = &mut self.blocks[..self.places.blocks()];
+        self.crew.each(blocks.chunks_mut(COPIED_TOGETHER / LANES), |blocks| {
+            blocks.iter_mut().for_each(Block::forget_impulses);
+        });
+        self.impulse_sum = 0;
+        self.entered = false;
+    }
+
     /// Collisions decoded, padding entries among them.
     pub(crate) fn len(&self) -> usize {
         self.slots.len()
     }
 
     /// Copies the velocities of all bodies into the lines, unless they are there already.
-    pub(crate) fn enter(&mut self, velocities: &[Velocity], shape_of: &[u8], masses: &[Mass]) {
+    pub(crate) fn enter(&mut self, velocities: &[Velocity], properties: Properties<'_>) {
         if self.entered {
             return;
         }
@@ -194,6 +185,7 @@ impl Batch {
         if self.lines.len() < lines {
             self.lines.resize(lines, Line::default());
         }
+        let Properties { shape_of, masses, inertias } = properties;
         let own = &mut self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
         let rounded = self.precision == Precision::Binary16;
@@ -211,6 +203,19 @@ impl Batch {
                 }
             },
         );
+        if self.inertia == Inertia::World {
+            let rows = 2 * self.lines.len();
+            if self.inertias.len() < rows {
+                self.inertias.resize(rows, InertiaRow::default());
+            }
+            let own = &mut self.inertias[ROWS_APART as usize..];
+            let parts = inertias.chunks(COPIED_TOGETHER).zip(own.chunks_mut(COPIED_TOGETHER));
+            self.crew.each(parts, |(inertias, rows)| {
+                for (row, inertia) in rows.iter_mut().zip(inertias) {
+                    *row = inertia::row(*inertia);
+                }
+            });
+        }
         self.entered = true;
     }
 
@@ -245,16 +250,14 @@ impl Batch {
         self.places.distance()
     }
 
-    /// Runs whole passes over all collisions. A step's passes are numbered from 0; the first `contact`
-    /// are contact passes. `velocities` has an entry for every body.
+    /// Runs whole passes over all collisions, from the velocities on that were entered before, or else
+    /// from `velocities` on, which has an entry for every body. [`leave`](Self::leave) gives the new ones.
     pub(crate) fn run(
         &mut self,
         passes: Range<u32>,
-        contact: u32,
-        parameters: &SolverParameters,
-        shape_of: &[u8],
-        masses: &[Mass],
-        velocities: &mut [Velocity],
+        plan: &Plan<'_>,
+        properties: Properties<'_>,
+        velocities: &[Velocity],
     ) {
         if passes.is_empty() || self.places.blocks() == 0 {
             return;
@@ -263,22 +266,35 @@ impl Batch {
             self.fronts.measure(&self.places);
             self.measured = true;
         }
-        self.enter(velocities, shape_of, masses);
-        let finding = passes.clone().find(|pass| *pass >= contact && !self.spins);
-        let (width, precision) = (self.width, self.precision);
+        self.enter(velocities, properties);
+        let finding = passes.clone().find(|pass| plan.damps(*pass) && !self.spins);
+        if plan.warm && self.given.len() < self.places.blocks() {
+            self.given.resize(self.places.blocks(), Given::NONE);
+        }
+        let (width, precision, inertia) = (self.width, self.precision, self.inertia);
         let rounded;
-        let parameters = match precision {
-            Precision::F32 => parameters,
+        let plan = match precision {
+            Precision::F32 => *plan,
             Precision::Binary16 => {
-                rounded = parameters.rounded::<Half>();
-                &rounded
+                rounded = plan.parameters.rounded::<Half>();
+                Plan { parameters: &rounded, ..*plan }
             }
         };
-        let run = Passes { numbers: &passes, contact, finding, parameters, width, precision };
+        let given = &self.given[..];
+        let numbers = &passes;
+        let run = Passes { numbers, plan, finding, given, width, precision, inertia };
         let blocks = &mut self.blocks[..self.places.blocks()];
-        let sum = self.fronts.run(run, blocks, &mut self.lines, &mut self.crew);
+        let (lines, inertias) = (&mut self.lines, &self.inertias);
+        let sum = self.fronts.run(run, blocks, lines, inertias, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
+    }
+
+    /// Stores the entered velocities as the passes have left them.
+    pub(crate) fn leave(&mut self, velocities: &mut [Velocity]) {
+        if !self.entered {
+            return;
+        }
         let own = &self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks_mut(COPIED_TOGETHER).zip(own.chunks(COPIED_TOGETHER / 2));
         self.crew.each(bodies, |(velocities, lines)| {
@@ -289,33 +305,34 @@ impl Batch {
     }
 
     /// Runs a part of one pass, one collision after the other in the order received.
-    #[expect(clippy::too_many_arguments, reason = "the arguments of `run`, and the part")]
     pub(crate) fn run_part(
         &mut self,
         pass: u32,
         part: Range<usize>,
-        contact: u32,
-        parameters: &SolverParameters,
-        shape_of: &[u8],
-        masses: &[Mass],
+        plan: &Plan<'_>,
+        properties: Properties<'_>,
         velocities: &mut [Velocity],
     ) {
-        let stage = Stage::new(pass, contact);
+        let stage = plan.stage(pass);
         self.entered = false;
         for index in part {
-            let Some((block, lane)) = self.slot(index) else { continue };
-            let block = &mut self.blocks[block];
+            let Some((at, lane)) = self.slot(index) else { continue };
+            let block = &mut self.blocks[at];
             let Entry { bodies, moving } = block.entry(lane);
             let sides = bodies.map(|body| body as usize);
             let mut pair = sides.map(|body| velocities[body]);
             let mut impulses = block.impulses(lane);
-            let masses = sides.map(|body| masses[usize::from(shape_of[body])]);
-            let collision = block.collision(lane);
-            let solve = match self.precision {
-                Precision::F32 => Stage::solve::<Single>,
-                Precision::Binary16 => Stage::solve::<Half>,
+            let masses = sides.map(|body| properties.mass(body));
+            let mut collision = block.collision(lane);
+            if let Some(given) = self.given.get(at) {
+                collision.impulses = given.of(stage.contact, lane);
+            }
+            let solve = match (self.precision, self.inertia) {
+                (Precision::F32, Inertia::Isotropic) => Stage::solve::<Single, Isotropic>,
+                (Precision::F32, Inertia::World) => Stage::solve::<Single, World>,
+                (Precision::Binary16, _) => Stage::solve::<Half, Isotropic>,
             };
-            let sum = solve(stage, &collision, parameters, &masses, &mut pair, &mut impulses);
+            let sum = solve(stage, &collision, plan.parameters, &masses, &mut pair, &mut impulses);
             self.impulse_sum = self.impulse_sum.saturating_add(sum);
             block.put_impulses(lane, impulses);
             for side in 0..2 {

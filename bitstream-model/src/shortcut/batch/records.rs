@@ -15,10 +15,25 @@ pub(crate) const BEATS: [usize; STREAMS] = [2, 2, 2, 1];
 pub(crate) const PLACES: [(usize, usize); collision::ROWS] =
     [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1)];
 
+/// The stream and the place there of the row that follows a record in a warm pass: its impulses.
+pub(crate) const IMPULSES: (usize, usize) = (3, 1);
+const _: () = assert!(IMPULSES.1 == BEATS[IMPULSES.0]);
+
+/// Beats of a record on each stream, in a warm pass or in another one.
+const fn beats(warm: bool) -> [usize; STREAMS] {
+    let mut beats = BEATS;
+    if warm {
+        beats[IMPULSES.0] += 1;
+    }
+    beats
+}
+
 /// Records that have arrived, on four streams.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Records<'a> {
     pub(crate) streams: [&'a [Beat]; STREAMS],
+    /// Whether impulses follow each, which are not read here.
+    pub(crate) warm: bool,
     /// Whether each has the friction of its pair above its contact count.
     pub(crate) pair_friction: bool,
 }
@@ -37,7 +52,7 @@ impl<'a> Records<'a> {
     #[inline(always)]
     fn row(&self, record: usize, row: usize) -> Row {
         let stream = row % STREAMS;
-        self.streams[stream][record * BEATS[stream] + row / STREAMS].0
+        self.streams[stream][record * beats(self.warm)[stream] + row / STREAMS].0
     }
 
     /// All rows of a record.
@@ -88,9 +103,10 @@ fn columns(
     row: usize,
 ) -> [F32x16; 4] {
     let stream = row % STREAMS;
-    let first = first * BEATS[stream] + row / STREAMS;
+    let beats = beats(records.warm)[stream];
+    let first = first * beats + row / STREAMS;
     let quads: &[Quad] = bytemuck::cast_slice(&records.streams[stream][first..]);
-    instructions.load(quads, BEATS[stream])
+    instructions.load(quads, beats)
 }
 
 #[inline(always)]

@@ -3,9 +3,11 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::accelerator::arithmetic::number::Number;
+use crate::accelerator::arithmetic::inertia::{Inertia as InertiaForm, Stored};
+use crate::accelerator::arithmetic::number::{Format, Number};
 use crate::accelerator::records::array::Row;
 use crate::accelerator::records::segment::PacketError;
+use crate::accelerator::solver::{self, Mass, SolverParameters};
 use crate::cast::register;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::StreamFormat;
@@ -59,9 +61,32 @@ pub(crate) struct Step {
     pub(crate) records: Vec<[Row; collision::ROWS]>,
     pub(crate) shape_of: Vec<u8>,
     pub(crate) velocities: Vec<Velocity>,
+    /// World inertia of each body, or none.
+    pub(crate) inertias: Vec<Stored>,
+    /// The impulses of each collision that the first pass of each kind brings, or none.
+    pub(crate) given: Vec<[Impulses; 2]>,
 }
 
 impl Step {
+    pub(crate) fn properties(&self) -> Properties<'_> {
+        let Self { shape_of, inertias, .. } = self;
+        Properties { shape_of, masses: &MASSES, inertias }
+    }
+
+    /// The passes, the first `contact` of them contact passes.
+    fn plan(&self, contact: u32) -> Plan<'static> {
+        Plan { contact, warm: !self.given.is_empty(), parameters: &PARAMETERS }
+    }
+
+    /// The same with the inertia of the shapes.
+    fn isotropic(self) -> Self {
+        Self { inertias: Vec::new(), ..self }
+    }
+
+    fn inertia(&self) -> Inertia {
+        if self.inertias.is_empty() { Inertia::Isotropic } else { Inertia::World }
+    }
+
     pub(crate) fn streams(&self, records: Range<usize>) -> [Vec<Beat>; 4] {
         let mut streams = [const { Vec::new() }; 4];
         for rows in &self.records[records] {
@@ -86,20 +111,48 @@ impl Step {
         for Velocity { linear, angular } in &mut self.velocities {
             (*linear, *angular) = (rounded::<F, 3>(*linear), rounded::<F, 3>(*angular));
         }
+        for impulses in self.given.as_flattened_mut() {
+            *impulses = rounded::<F, 4>(*impulses);
+        }
         self
     }
 
     fn decoded(&self, mut batch: Batch, cut: usize, masses: &[Mass]) -> Batch {
         batch.begin(self.records.len(), false);
         for part in [0..cut, cut..self.records.len()] {
-            let streams = self.streams(part.clone());
-            let streams = streams.each_ref().map(Vec::as_slice);
+            let mut streams = self.streams(part.clone());
             let mut sums = vec![0; part.len()];
-            batch
-                .decode(streams, part.len(), &self.shape_of, masses, &mut sums)
-                .expect("nothing is wrong");
+            if self.given.is_empty() {
+                let streams = streams.each_ref().map(Vec::as_slice);
+                batch.decode(streams, part.len(), &self.shape_of, masses, &mut sums)
+            } else {
+                let pairs = [0, 1].map(|kind| self.with_impulses(part.clone(), kind, &streams[3]));
+                streams[3] = pairs[0].concat();
+                let streams = streams.each_ref().map(Vec::as_slice);
+                let decoded =
+                    batch.decode_warm(streams, part.len(), &self.shape_of, masses, &mut sums);
+                for (contact, pairs) in [true, false].into_iter().zip(&pairs) {
+                    let mut of_impulses = vec![0; part.len()];
+                    batch.give(contact, part.start, pairs, &mut of_impulses);
+                    for (sum, [_, beat]) in of_impulses.iter().zip(pairs) {
+                        assert_eq!(*sum, beat.0.into_iter().fold(0, u32::wrapping_add));
+                    }
+                }
+                decoded
+            }
+            .expect("nothing is wrong");
+            for (rows, sum) in self.records[part].iter().zip(&sums) {
+                let words = rows.as_flattened().iter();
+                assert_eq!(*sum, words.fold(0, |sum, word| word.wrapping_add(sum)));
+            }
         }
         batch
+    }
+
+    /// Contact points, each with the impulses of its collision behind it.
+    fn with_impulses(&self, part: Range<usize>, kind: usize, points: &[Beat]) -> Vec<[Beat; 2]> {
+        let impulses = self.given[part].iter().map(|given| Beat(given[kind].map(f32::to_bits)));
+        points.iter().copied().zip(impulses).map(|(point, impulses)| [point, impulses]).collect()
     }
 
     /// Velocities, impulses and impulse sum after the passes, one collision after the other.
@@ -107,32 +160,46 @@ impl Step {
         &self,
         contact: u32,
         passes: u32,
-        masses: &[Mass],
     ) -> (Vec<Velocity>, Vec<Impulses>, u64) {
+        match self.inertia() {
+            Inertia::Isotropic => self.expected_with::<F, Isotropic>(contact, passes),
+            Inertia::World => self.expected_with::<F, World>(contact, passes),
+        }
+    }
+
+    fn expected_with<F: Format, I: InertiaForm>(
+        &self,
+        contact: u32,
+        passes: u32,
+    ) -> (Vec<Velocity>, Vec<Impulses>, u64) {
+        let properties = self.properties();
         let mut velocities = self.velocities.clone();
         let mut impulses = vec![[0.0; 4]; self.records.len()];
         let mut sum = 0_u64;
         for pass in 0..passes {
-            for (rows, impulses) in self.records.iter().zip(&mut impulses) {
+            let kind = usize::from(pass >= contact);
+            let warm = !self.given.is_empty() && (pass == 0 || pass == contact);
+            for (index, (rows, impulses)) in self.records.iter().zip(&mut impulses).enumerate() {
+                let given = self.given.get(index).filter(|_| warm).map(|given| &given[kind]);
                 let collision = Collision::absolute(StreamFormat::F32, rows);
                 if collision.count == 0 {
                     continue;
                 }
                 let sides = [collision.body_a as usize, collision.body_b as usize];
-                let both = sides.map(|body| masses[usize::from(self.shape_of[body])]);
+                let both = sides.map(|body| properties.mass(body));
                 let mut pair = sides.map(|body| velocities[body]);
                 let arguments = (&collision, &PARAMETERS, &both);
                 let (collision, parameters, both) = arguments;
                 if pass < contact {
-                    solver::contact::<F, F, Isotropic>(
-                        collision, parameters, both, &mut pair, impulses, None,
+                    solver::contact::<F, F, I>(
+                        collision, parameters, both, &mut pair, impulses, given,
                     );
                 } else {
                     if pass == contact {
                         *impulses = [solver::normal_sum::<F>(impulses), 0.0, 0.0, 0.0];
                     }
-                    solver::friction::<F, F, Isotropic>(
-                        collision, parameters, both, &mut pair, impulses, None,
+                    solver::friction::<F, F, I>(
+                        collision, parameters, both, &mut pair, impulses, given,
                     );
                 }
                 if pass + 1 == contact {
@@ -229,10 +296,12 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
             (
                 prop::collection::vec(0..shapes, bodies),
                 prop::collection::vec((vector(4.0, special), vector(4.0, special)), bodies),
+                prop::collection::vec((vector(4.0, special), vector(1.0, special)), bodies),
                 prop::collection::vec((0..bodies, 1..bodies, numbers(special)), 0..collisions),
+                (any::<bool>(), prop::collection::vec(number(0.3, special), 8 * collisions)),
             )
         })
-        .prop_map(|(mut shape_of, velocities, collisions)| {
+        .prop_map(|(mut shape_of, velocities, inertias, collisions, (warm, given))| {
             let bodies = shape_of.len();
             // The last one moves and stands in where neither would.
             shape_of[bodies - 1] = 1;
@@ -247,7 +316,11 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
                 let (a, b) = (register(a), register(b));
                 [row(normal, count), row(position_a, a), row(position_b, b), p, q, r, s]
             });
-            let records = records.collect();
+            let records: Vec<_> = records.collect();
+            let given = given.chunks_exact(8).take(if warm { records.len() } else { 0 });
+            let given =
+                given.map(|of| [0, 4].map(|at| [of[at], of[at + 1], of[at + 2], of[at + 3]]));
+            let given = given.collect();
             let velocities = velocities.iter().zip(&shape_of).map(|((linear, angular), shape)| {
                 // As they are loaded.
                 let moves = MASSES[usize::from(*shape)].inverse_mass != 0.0;
@@ -255,7 +328,12 @@ fn steps(collisions: usize, special: bool) -> impl Strategy<Value = Step> {
                 if moves { velocity } else { Velocity::default() }
             });
             let velocities = velocities.collect();
-            Step { records, shape_of, velocities }
+            let inertia = |(diagonal, others): ([f32; 3], [f32; 3])| {
+                let ([xx, yy, zz], [xy, xz, yz]) = (diagonal, others);
+                [xx, yy, zz, xy, xz, yz]
+            };
+            let inertias = inertias.into_iter().map(inertia).collect();
+            Step { records, shape_of, velocities, inertias, given }
         })
 }
 
@@ -267,32 +345,54 @@ pub(crate) fn batch(threads: usize, width: prop::sample::Index) -> Batch {
 
 /// Runs a step in a batch, the passes in two calls, and compares.
 fn check<F: Tested>(step: &Step, batch: Batch, contact: u32, passes: u32, halt: u32) -> Batch {
-    let batch = batch.of(F::PRECISION, 1);
+    let batch = batch.of(F::PRECISION, 1).with_inertia(step.inertia());
     let mut batch = step.decoded(batch, step.records.len() / 3, &MASSES);
-    let (expected, impulses, sum) = step.expected::<F>(contact, passes, &MASSES);
+    let (expected, impulses, sum) = step.expected::<F>(contact, passes);
     let mut found = step.velocities.clone();
     let halt = halt.min(passes);
-    for part in [0..halt, halt..passes] {
-        batch.run(part, contact, &PARAMETERS, &step.shape_of, &MASSES, &mut found);
+    // The second time all at once, from the velocities before the passes on.
+    for halt in [halt, passes] {
+        for part in [0..halt, halt..passes] {
+            batch.run(part, &step.plan(contact), step.properties(), &step.velocities);
+        }
+        batch.leave(&mut found);
+        assert_eq!(velocity_bits(&found), velocity_bits(&expected));
+        for (index, expected) in impulses.iter().enumerate() {
+            assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
+        }
+        assert_eq!(batch.impulse_sum(), sum);
+        check_outgoing(&mut batch, &impulses);
+        batch.restart();
     }
-    assert_eq!(velocity_bits(&found), velocity_bits(&expected));
-    for (index, expected) in impulses.iter().enumerate() {
-        assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
-    }
-    assert_eq!(batch.impulse_sum(), sum);
     batch
+}
+
+/// Compares the impulses that go out after a pass of either kind.
+fn check_outgoing(batch: &mut Batch, impulses: &[Impulses]) {
+    for contact in [true, false] {
+        let mut beats = vec![Beat([7; 4]); impulses.len()];
+        let sum = batch.outgoing(contact, 0, &mut beats);
+        let words = beats.iter().flat_map(|beat| beat.0);
+        assert_eq!(sum, words.fold(0, u32::wrapping_add));
+        for (beat, impulses) in beats.iter().zip(impulses) {
+            let [_, first, second, _] = *impulses;
+            let expected = if contact { *impulses } else { [first, second, 0.0, 0.0] };
+            assert_eq!(bits(beat.0.map(f32::from_bits)), bits(expected));
+        }
+    }
 }
 
 /// Runs two passes of a step, then a third one in two parts, and compares.
 fn check_parts<F: Tested>(step: &Step, batch: Batch, cut: usize) {
-    let mut batch = step.decoded(batch.of(F::PRECISION, 1), cut, &MASSES);
+    let mut batch =
+        step.decoded(batch.of(F::PRECISION, 1).with_inertia(step.inertia()), cut, &MASSES);
     let mut velocities = step.velocities.clone();
-    let shapes = &step.shape_of;
-    batch.run(0..2, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+    batch.run(0..2, &step.plan(1), step.properties(), &step.velocities);
+    batch.leave(&mut velocities);
     for part in [0..cut, cut..step.records.len()] {
-        batch.run_part(2, part, 1, &PARAMETERS, shapes, &MASSES, &mut velocities);
+        batch.run_part(2, part, &step.plan(1), step.properties(), &mut velocities);
     }
-    let (expected, impulses, sum) = step.expected::<F>(1, 3, &MASSES);
+    let (expected, impulses, sum) = step.expected::<F>(1, 3);
     assert_eq!(velocity_bits(&velocities), velocity_bits(&expected));
     for (index, expected) in impulses.iter().enumerate() {
         assert_eq!(bits(batch.impulses(index)), bits(*expected), "collision {index}");
@@ -333,6 +433,8 @@ proptest! {
     ) {
         let batch = || batch(threads, width);
         check::<Single>(&step, batch(), contact, contact + friction, halt);
+        let step = step.isotropic();
+        check::<Single>(&step, batch(), contact, contact + friction, halt);
         check::<Half>(&step.in_format::<Half>(), batch(), contact, contact + friction, halt);
     }
 
@@ -343,6 +445,8 @@ proptest! {
         friction in 0_u32..3,
         width: prop::sample::Index,
     ) {
+        check::<Single>(&step, batch(1, width), contact, contact + friction, 1);
+        let step = step.isotropic();
         check::<Single>(&step, batch(1, width), contact, contact + friction, 1);
         let step = step.in_format::<Half>();
         check::<Half>(&step, batch(1, width), contact, contact + friction, 1);
@@ -355,6 +459,8 @@ proptest! {
         width: prop::sample::Index,
     ) {
         let cut = cut.min(step.records.len());
+        check_parts::<Single>(&step, batch(1, width), cut);
+        let step = step.isotropic();
         check_parts::<Single>(&step, batch(1, width), cut);
         check_parts::<Half>(&step.in_format::<Half>(), batch(1, width), cut);
     }
@@ -397,7 +503,8 @@ fn chain(pairs: &[[u32; 2]], bodies: usize, fixed: &[usize]) -> Step {
         Velocity { linear: [0.1 * speed, speed, 0.0], angular: [speed, 0.0, -speed] }
     };
     let records = records.collect();
-    Step { records, velocities: (0..bodies).map(velocity).collect(), shape_of }
+    let velocities = (0..bodies).map(velocity).collect();
+    Step { records, velocities, shape_of, inertias: Vec::new(), given: Vec::new() }
 }
 
 #[test]

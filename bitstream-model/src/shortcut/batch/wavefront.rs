@@ -17,27 +17,31 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
-use bytemuck::{Pod, Zeroable};
 use pgs_support::Crew;
 use pgs_support::lanes::{Instructions, Work, prefetch};
 
-use super::Stage;
 use super::block::{Block, LANES, kind};
+use super::given::Given;
 use super::grouping::Places;
-use super::kernel::{self, BodyRow, Pass};
+use super::inertia::Form;
+use super::kernel::{self, InertiaRow, Pass, Rows};
+use super::line::Line;
 use super::numbers::Computed;
 use super::order::Order;
+use super::plan::Plan;
 use super::width::Width;
+use crate::accelerator::arithmetic::inertia::{Isotropic, World};
 use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::per_record::fixed_impulse;
-use crate::accelerator::solver::{Mass, SolverParameters, Velocity};
+use crate::accelerator::solver::{Mass, Velocity};
 use crate::cast::register;
 use pgs_interface::number::Precision;
+use pgs_interface::profile::Inertia;
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
-/// Passes that a thread takes at once.
-const BUNDLE: usize = 4;
+/// Passes that a thread takes at once, at most: the ones of a kind in a usual step with a warm start.
+const BUNDLE_MAX: usize = 5;
 /// Looks at another thread's front before the processor is given away.
 const SPINS: u32 = 200;
 
@@ -63,13 +67,15 @@ pub(crate) struct Fronts {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Passes<'a> {
     pub(crate) numbers: &'a Range<u32>,
-    pub(crate) contact: u32,
+    pub(crate) plan: Plan<'a>,
     /// The friction pass that finds which spins are damped.
     pub(crate) finding: Option<u32>,
-    pub(crate) parameters: &'a SolverParameters,
+    /// In a step with a warm start the impulses that came in, for each block.
+    pub(crate) given: &'a [Given],
     pub(crate) width: Width,
     /// Precision of the arithmetic.
     pub(crate) precision: Precision,
+    pub(crate) inertia: Inertia,
 }
 
 impl Fronts {
@@ -86,12 +92,13 @@ impl Fronts {
     }
 
     /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
-    /// of the blocks are in `lines`.
+    /// of the blocks are in `lines`; with world inertia each has one in `inertias` too.
     pub(crate) fn run(
         &mut self,
         passes: Passes<'_>,
         blocks: &mut [Block],
         lines: &mut [Line],
+        inertias: &[InertiaRow],
         crew: &mut Crew,
     ) -> u64 {
         let count = passes.numbers.len();
@@ -105,7 +112,7 @@ impl Fronts {
             passes,
             blocks: blocks.as_mut_ptr(),
             order: &self.order.blocks,
-            bodies: lines.as_mut_ptr().cast(),
+            rows: Rows { bodies: lines.as_mut_ptr().cast(), inertias: inertias.as_ptr() },
             needs: &self.needs,
             progress: &self.progress[..count],
             next: AtomicUsize::new(0),
@@ -118,37 +125,13 @@ impl Fronts {
     }
 }
 
-/// Rows of velocities: two to a cache line. A row is the linear velocity and the inverse mass, then
-/// the angular velocity and the inverse inertia.
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C, align(64))]
-pub(crate) struct Line([BodyRow; 2]);
-
-impl Line {
-    pub(crate) fn put(&mut self, second: bool, velocity: &Velocity, mass: &Mass) {
-        let ([x, y, z], [p, q, r]) = (velocity.linear, velocity.angular);
-        let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
-        self.0[usize::from(second)] = row;
-    }
-
-    pub(crate) fn velocity(&self, second: bool) -> Velocity {
-        let [[x, y, z, _], [p, q, r, _]] = self.0[usize::from(second)];
-        Velocity { linear: [x, y, z], angular: [p, q, r] }
-    }
-
-    /// Whether a body moves.
-    pub(crate) fn moves(&self, second: bool) -> bool {
-        self.0[usize::from(second)][0][3] != 0.0
-    }
-}
-
 /// The state that the threads of a run share.
 struct Field<'a> {
     passes: Passes<'a>,
     blocks: *mut Block,
     /// All blocks, each once.
     order: &'a [u32],
-    bodies: *mut BodyRow,
+    rows: Rows,
     needs: &'a [u32],
     progress: &'a [Progress],
     /// The next pass that no thread has taken.
@@ -177,6 +160,12 @@ impl Drop for Breaks<'_> {
 }
 
 impl Field<'_> {
+    /// The impulses that a pass brings for a block.
+    #[inline(always)]
+    fn given<const WARM: bool>(&self, block: u32) -> Option<&Given> {
+        if WARM { self.passes.given.get(block as usize) } else { None }
+    }
+
     /// The work of a thread: takes passes while any are left, then helps.
     fn work(&self, thread: usize) {
         let mut breaks = Breaks(Some(&self.broken));
@@ -212,8 +201,11 @@ impl Field<'_> {
         if self.next.load(Ordering::Relaxed) >= count {
             return 0..0;
         }
-        let first = self.next.fetch_add(BUNDLE, Ordering::Relaxed).min(count);
-        first..(first + BUNDLE).min(count)
+        // As few bundles as possible, of about the same length; two threads take one each.
+        let least = if self.alone { 1 } else { 2 };
+        let bundle = count.div_ceil(count.div_ceil(BUNDLE_MAX).max(least));
+        let first = self.next.fetch_add(bundle, Ordering::Relaxed).min(count);
+        first..(first + bundle).min(count)
     }
 
     /// Whether a pass has come to its end.
@@ -274,26 +266,38 @@ impl Field<'_> {
 
     /// Runs a pass over a chunk that the pass before has left behind.
     fn chunk(&self, pass: usize, chunk: usize, thread: usize) {
-        match self.passes.precision {
-            Precision::F32 => self.chunk_in::<Single>(pass, chunk, thread),
-            Precision::Binary16 => self.chunk_in::<Half>(pass, chunk, thread),
-        }
-    }
-
-    /// The same in a format.
-    fn chunk_in<F: Computed>(&self, pass: usize, chunk: usize, thread: usize) {
         let number = self.passes.numbers.start + register(pass);
-        let stage = Stage::new(number, self.passes.contact);
+        let stage = self.passes.plan.stage(number);
         let pass = Pass {
             stage,
             finds: self.passes.finding == Some(number),
-            parameters: self.passes.parameters,
+            parameters: self.passes.plan.parameters,
             spare: 2 * (register(thread) + 1),
         };
+        match (self.passes.precision, self.passes.inertia, stage.warm) {
+            (Precision::F32, Inertia::Isotropic, false) => {
+                self.chunk_in::<Single, Isotropic, false>(pass, chunk);
+            }
+            (Precision::F32, Inertia::Isotropic, true) => {
+                self.chunk_in::<Single, Isotropic, true>(pass, chunk);
+            }
+            (Precision::F32, Inertia::World, false) => {
+                self.chunk_in::<Single, World, false>(pass, chunk);
+            }
+            (Precision::F32, Inertia::World, true) => {
+                self.chunk_in::<Single, World, true>(pass, chunk);
+            }
+            // No layout has world inertia or a warm start in sixteen bits.
+            (Precision::Binary16, ..) => self.chunk_in::<Half, Isotropic, false>(pass, chunk),
+        }
+    }
+
+    /// The same in a format, with a form of inertia, in a warm pass or another one.
+    fn chunk_in<F: Computed, I: Form, const WARM: bool>(&self, pass: Pass<'_>, chunk: usize) {
         let mut sum = 0;
         let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
-        let format = PhantomData::<F>;
-        let work = ChunkWork { field: self, pass, blocks, sum: &mut sum, format };
+        let format = PhantomData::<(F, I)>;
+        let work = ChunkWork::<F, I, WARM> { field: self, pass, blocks, sum: &mut sum, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
         }
@@ -305,39 +309,43 @@ impl Field<'_> {
 }
 
 /// A pass over the blocks of a chunk.
-struct ChunkWork<'a, F> {
+struct ChunkWork<'a, F, I, const WARM: bool> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
     blocks: &'a [u32],
     sum: &'a mut u64,
-    format: PhantomData<F>,
+    format: PhantomData<(F, I)>,
 }
 
-impl<F: Computed> Work for ChunkWork<'_, F> {
+impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, instructions: impl Instructions) {
         for (at, &index) in self.blocks.iter().enumerate() {
-            if let Some(ahead) = self.blocks.get(at + 1) {
-                let ahead = self.field.blocks.wrapping_add(*ahead as usize);
-                prefetch(ahead);
+            if let Some(&ahead) = self.blocks.get(at + 1) {
+                prefetch(self.field.blocks.wrapping_add(ahead as usize));
+                if let Some(given) = self.field.given::<WARM>(ahead) {
+                    prefetch(given);
+                }
             }
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
+            let given = self.field.given::<WARM>(index);
             if block.serial() {
                 // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
                 // has the chunk, the rows of its bodies are its own: see `Sync`.
-                let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
+                let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
             let arithmetic = F::arithmetic(instructions);
             // SAFETY: the same holds for the rows of its bodies, and for the spare one.
             unsafe {
-                kernel::solve(arithmetic, instructions, &self.pass, block, self.field.bodies);
+                let rows = self.field.rows;
+                kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, given, rows);
             }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
@@ -346,16 +354,17 @@ impl<F: Computed> Work for ChunkWork<'_, F> {
     }
 }
 
-impl<F: Computed> ChunkWork<'_, F> {
+impl<F: Computed, I: Form, const WARM: bool> ChunkWork<'_, F, I, WARM> {
     fn one_by_one(self) {
         for &index in self.blocks {
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
+            let given = self.field.given::<WARM>(index);
             // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
             // has the chunk, the rows of its bodies are its own: see `Sync`.
-            let sum = unsafe { one_by_one::<F>(&self.pass, block, self.field.bodies) };
+            let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
             *self.sum = self.sum.saturating_add(sum);
         }
     }
@@ -371,38 +380,60 @@ fn counted<F: Computed>(block: &Block) -> u64 {
 ///
 /// # Safety
 ///
-/// The rows of the block exist. While this runs, no other thread writes them, and none reads the rows
-/// of moving bodies.
-unsafe fn one_by_one<F: Computed>(pass: &Pass<'_>, block: &mut Block, bodies: *mut BodyRow) -> u64 {
+/// The rows of the block exist, with world inertia in both arrays. While this runs, no other thread
+/// writes them, and none reads the rows of moving bodies.
+unsafe fn one_by_one<F: Computed, I: Form>(
+    pass: &Pass<'_>,
+    block: &mut Block,
+    given: Option<&Given>,
+    rows: Rows,
+) -> u64 {
     let mut sum = 0_u64;
     for lane in 0..LANES {
-        let collision = block.collision(lane);
+        let mut collision = block.collision(lane);
         if collision.count == 0 {
             continue;
         }
+        if let Some(given) = given {
+            collision.impulses = given.of(pass.stage.contact, lane);
+        }
         let mut masses = [Mass::default(); 2];
         let mut velocities = [Velocity::default(); 2];
+        let mut beside = [0.0; 2];
         for side in 0..2 {
+            let index = block.rows[side][lane] as usize;
             // SAFETY: the caller promises that the row exists.
-            let row = unsafe { bodies.add(block.rows[side][lane] as usize) };
+            let row = unsafe { rows.bodies.add(index) };
             // SAFETY: the caller promises that it can be read.
             let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
             velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
-            masses[side] = Mass { inverse_mass: m, inverse_inertia: [k, 0.0, 0.0, 0.0, 0.0, 0.0] };
+            let inverse_inertia = I::stored(k, || {
+                // SAFETY: the caller promises that the row exists.
+                let row = unsafe { rows.inertias.add(index) };
+                // SAFETY: no thread writes an inertia.
+                unsafe { row.read() }
+            });
+            masses[side] = Mass { inverse_mass: m, inverse_inertia };
+            beside[side] = k;
         }
         let mut impulses = block.impulses(lane);
         let stage = pass.stage;
-        let share =
-            stage.solve::<F>(&collision, pass.parameters, &masses, &mut velocities, &mut impulses);
+        let share = stage.solve::<F, I>(
+            &collision,
+            pass.parameters,
+            &masses,
+            &mut velocities,
+            &mut impulses,
+        );
         sum = sum.saturating_add(share);
         block.put_impulses(lane, impulses);
         for side in 0..2 {
             if block.kind[lane] & kind::MOVES[side] != 0 {
                 let (Velocity { linear: [x, y, z], angular: [p, q, r] }, mass) =
                     (velocities[side], masses[side]);
-                let row = [[x, y, z, mass.inverse_mass], [p, q, r, mass.inverse_inertia[0]]];
+                let row = [[x, y, z, mass.inverse_mass], [p, q, r, beside[side]]];
                 // SAFETY: the caller promises that the row exists.
-                let at = unsafe { bodies.add(block.rows[side][lane] as usize) };
+                let at = unsafe { rows.bodies.add(block.rows[side][lane] as usize) };
                 // SAFETY: the caller promises that a moving body's can be written.
                 unsafe { at.write(row) };
             }

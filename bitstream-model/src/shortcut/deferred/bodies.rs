@@ -5,13 +5,15 @@
 //! three           0 1 | 2 0 | 1 2 |
 //! ```
 //!
-//! After two bodies, or three, the next one begins with stream 0 again: that is a period.
+//! After two bodies, or three, the next one begins with stream 0 again: that is a period. With world
+//! inertia a body has four rows, and a period on four streams is one body.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use super::Deferred;
 use crate::accelerator::Accelerator;
+use crate::accelerator::arithmetic::inertia::Stored;
 use crate::accelerator::control::Arguments;
 use crate::accelerator::defer::ArrivedRecords;
 use crate::accelerator::records::array::Row;
@@ -23,7 +25,7 @@ use crate::accelerator::solver::{Mass, Velocity};
 use crate::cast::register;
 use crate::config::SHAPES_MAX;
 use crate::memory::{Memory, Source};
-use crate::shortcut::batch::ResultPlaces;
+use crate::shortcut::batch::{Properties, ResultPlaces};
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::StreamFormat;
@@ -44,26 +46,41 @@ pub(crate) fn beats_of_results(turns: Turns, bodies: Range<usize>) -> PerStream 
     std::array::from_fn(|k| after[k] - before[k])
 }
 
-/// Bodies after which the next one begins with stream 0 again.
-pub(crate) const fn period(streams: usize) -> usize {
-    if streams.is_multiple_of(ROWS_IN) { streams / ROWS_IN } else { streams }
+/// Bodies of `rows` rows each after which the next one begins with stream 0 again.
+pub(crate) const fn period(streams: usize, rows: usize) -> usize {
+    let mut bodies = 1;
+    while !(bodies * rows).is_multiple_of(streams) {
+        bodies += 1;
+    }
+    bodies
 }
 
-/// Velocities or poses, two rows a body, in their buffers. The views begin with body `first`.
+/// Velocities or poses in their buffers. The views begin with body `first`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyRows<'a> {
     pub(crate) views: Views<'a>,
     pub(crate) turns: Turns,
+    /// Rows of a body.
+    pub(crate) rows: usize,
     pub(crate) first: usize,
+}
+
+/// Where bodies are loaded to.
+#[derive(Debug)]
+struct Loaded<'a> {
+    velocities: &'a mut [Velocity],
+    shape_of: &'a mut [u8],
+    /// With world inertia only.
+    inertias: &'a mut [Stored],
 }
 
 impl BodyRows<'_> {
     /// Beats on each stream before the views.
     pub(crate) fn before(&self) -> PerStream {
-        self.turns.counts(ROWS_IN * self.first)
+        self.turns.counts(self.rows * self.first)
     }
 
-    /// The rows of a body.
+    /// The rows of a body's pose.
     pub(crate) fn of(&self, body: usize) -> [Row; ROWS_IN] {
         let before = self.before();
         std::array::from_fn(|row| {
@@ -78,44 +95,51 @@ impl BodyRows<'_> {
         &self,
         first: usize,
         masses: &[Mass],
-        velocities: &mut [Velocity],
-        shape_of: &mut [u8],
+        to: Loaded<'_>,
         kinematic: bool,
     ) -> (u32, Option<usize>) {
-        match self.turns.streams {
-            4 => self.load_from::<4>(first, masses, velocities, shape_of, kinematic),
-            3 => self.load_from::<3>(first, masses, velocities, shape_of, kinematic),
-            2 => self.load_from::<2>(first, masses, velocities, shape_of, kinematic),
-            _ => self.load_from::<1>(first, masses, velocities, shape_of, kinematic),
+        const WORLD: usize = velocity::WORLD_ROWS;
+        match (self.turns.streams, self.rows) {
+            (4, WORLD) => self.load_from::<4, WORLD>(first, masses, to, kinematic),
+            (3, WORLD) => self.load_from::<3, WORLD>(first, masses, to, kinematic),
+            (2, WORLD) => self.load_from::<2, WORLD>(first, masses, to, kinematic),
+            (_, WORLD) => self.load_from::<1, WORLD>(first, masses, to, kinematic),
+            (4, _) => self.load_from::<4, ROWS_IN>(first, masses, to, kinematic),
+            (3, _) => self.load_from::<3, ROWS_IN>(first, masses, to, kinematic),
+            (2, _) => self.load_from::<2, ROWS_IN>(first, masses, to, kinematic),
+            (..) => self.load_from::<1, ROWS_IN>(first, masses, to, kinematic),
         }
     }
 
-    /// [`load`](Self::load) with the number of streams known when this is compiled.
-    fn load_from<const STREAMS: usize>(
+    /// [`load`](Self::load) with the numbers of streams and rows known when this is compiled.
+    fn load_from<const STREAMS: usize, const ROWS: usize>(
         &self,
         first: usize,
         masses: &[Mass],
-        velocities: &mut [Velocity],
-        shape_of: &mut [u8],
+        to: Loaded<'_>,
         kinematic: bool,
     ) -> (u32, Option<usize>) {
+        let Loaded { velocities, shape_of, inertias } = to;
         let turns = Turns { streams: STREAMS };
-        let (period, stride) = const { (period(STREAMS), period(STREAMS) * ROWS_IN / STREAMS) };
+        let (period, stride) =
+            const { (period(STREAMS, ROWS), period(STREAMS, ROWS) * ROWS / STREAMS) };
         let before = self.before();
         let (mut sum, mut wrong) = ([0_u32; LANES], None);
         for own in 0..period.min(velocities.len()) {
-            let rows = |row: usize| {
-                let (k, number) = turns.place(ROWS_IN * (first + own) + row);
+            let views: [&[Beat]; ROWS] = std::array::from_fn(|row| {
+                let (k, number) = turns.place(ROWS * (first + own) + row);
                 &self.views[k][number - before[k]..]
-            };
-            let (linears, angulars) = (rows(0), rows(1));
+            });
             for at in 0..(velocities.len() - own).div_ceil(period) {
-                let (linear, angular) = (&linears[at * stride], &angulars[at * stride]);
+                let rows: [Row; ROWS] = views.map(|view| view[at * stride].0);
                 let body = own + at * period;
-                for (sum, words) in sum.iter_mut().zip(linear.0.into_iter().zip(angular.0)) {
-                    *sum = sum.wrapping_add(words.0).wrapping_add(words.1);
+                for row in rows {
+                    for (sum, word) in sum.iter_mut().zip(row) {
+                        *sum = sum.wrapping_add(word);
+                    }
                 }
-                let (loaded, shape) = decode::velocity(StreamFormat::F32, &[linear.0, angular.0]);
+                let moving = [rows[velocity::LINEAR], rows[velocity::ANGULAR]];
+                let (loaded, shape) = decode::velocity(StreamFormat::F32, &moving);
                 let (Some(mass), Ok(shape)) = (masses.get(shape as usize), u8::try_from(shape))
                 else {
                     wrong = wrong.into_iter().chain([first + body]).min();
@@ -125,6 +149,11 @@ impl BodyRows<'_> {
                 let moves = mass.inverse_mass != 0.0 || kinematic;
                 velocities[body] = if moves { loaded } else { Velocity::default() };
                 shape_of[body] = shape;
+                if let (Ok(rows), Some(inertia)) =
+                    (rows.as_slice().try_into(), inertias.get_mut(body))
+                {
+                    *inertia = decode::world_inertia(StreamFormat::F32, rows);
+                }
             }
         }
         (sum.into_iter().fold(0, u32::wrapping_add), wrong)
@@ -132,10 +161,10 @@ impl BodyRows<'_> {
 
     /// The first of the next `bodies` bodies whose shape is not among `shapes`.
     fn without_shape(&self, bodies: usize, shapes: usize) -> Option<usize> {
-        let (period, before) = (period(self.turns.streams), self.before());
-        let stride = period * ROWS_IN / self.turns.streams;
+        let (period, before) = (period(self.turns.streams, self.rows), self.before());
+        let stride = period * self.rows / self.turns.streams;
         let found = (self.first..self.first + period.min(bodies)).filter_map(|begin| {
-            let (k, number) = self.turns.place(ROWS_IN * begin + velocity::LINEAR);
+            let (k, number) = self.turns.place(self.rows * begin + velocity::LINEAR);
             let linear = self.views[k].iter().skip(number - before[k]).step_by(stride);
             let most = (self.first + bodies - begin).div_ceil(period);
             let unknown = |beat: &Beat| beat.0[WORD_LANE] as usize >= shapes;
@@ -145,15 +174,26 @@ impl BodyRows<'_> {
     }
 }
 
+/// The shapes, masses and inertias of the bodies of the step under way.
+pub(super) fn properties<'a>(accelerator: &'a Accelerator, masses: &'a [Mass]) -> Properties<'a> {
+    Properties { shape_of: &accelerator.shape_of, masses, inertias: &accelerator.inertias }
+}
+
 impl Deferred {
     /// How bodies lie on the streams, if they can be taken from their buffers and put into them.
     pub(crate) fn bodies(&self) -> Option<Turns> {
         self.decoded.layout.bodies.filter(|_| self.active)
     }
 
-    /// The rows of the bodies that have arrived, if they are all in their buffers.
+    /// Rows of a body's velocity.
+    pub(crate) fn rows_of_velocity(&self) -> usize {
+        self.decoded.layout.velocity_rows
+    }
+
+    /// The rows of the bodies that have arrived, `rows` a body, if they are all in their buffers.
     pub(super) fn rows_of_next<'a>(
         &self,
+        rows: usize,
         segment: &Segment,
         ArrivedRecords { records, inputs, memory }: &ArrivedRecords<'a>,
     ) -> Option<BodyRows<'a>> {
@@ -167,7 +207,7 @@ impl Deferred {
                 *view = memory.view(source?, count)?;
             }
         }
-        Some(BodyRows { views, turns, first: segment.done })
+        Some(BodyRows { views, turns, rows, first: segment.done })
     }
 
     /// Loads the next bodies; returns the sum of their words.
@@ -182,10 +222,15 @@ impl Deferred {
         let kinematic = accelerator.arguments.kinematic;
         let velocities = accelerator.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let shapes = accelerator.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        let inertias = accelerator.inertias.get_mut(bodies.clone()).unwrap_or_default();
+        // Without world inertia there is none.
+        let none = std::iter::repeat_with(Default::default);
+        let inertias = inertias.chunks_mut(LOADED_TOGETHER).chain(none);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
-        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
-        batch.share(parts, |(first, (velocities, shapes))| {
-            let (of_part, wrong_body) = rows.load(first, masses, velocities, shapes, kinematic);
+        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes).zip(inertias));
+        batch.share(parts, |(first, ((velocities, shape_of), inertias))| {
+            let to = Loaded { velocities, shape_of, inertias };
+            let (of_part, wrong_body) = rows.load(first, masses, to, kinematic);
             sum.fetch_add(of_part, Ordering::Relaxed);
             wrong.fetch_min(wrong_body.unwrap_or(usize::MAX), Ordering::Relaxed);
         });
@@ -235,8 +280,8 @@ impl Deferred {
         poses: BodyRows<'_>,
         places: ResultPlaces<'_>,
     ) -> [u32; 2] {
-        let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
-        batch.enter(&accelerator.velocities, &accelerator.shape_of, masses);
+        let batch = &mut self.decoded.batch;
+        batch.enter(&accelerator.velocities, properties(accelerator, &self.decoded.masses));
         let Arguments { integrate, integration, .. } = &accelerator.arguments;
         batch.integrate(integrate.then_some(integration), bodies, poses, places)
     }
@@ -250,15 +295,15 @@ impl Deferred {
         cycles: u64,
         memory: &Memory,
     ) -> Option<usize> {
-        let turns = self.bodies()?;
+        let (turns, rows) = (self.bodies()?, self.rows_of_velocity());
         // A row a cycle from each stream.
         let most = usize::try_from(cycles).unwrap_or(usize::MAX).saturating_mul(turns.streams);
-        let records = segment.left().min((most / ROWS_IN).saturating_add(1));
+        let records = segment.left().min((most / rows).saturating_add(1));
         let mut views: Views<'_> = [&[]; STREAMS_MAX];
         for (view, (source, count)) in views.iter_mut().zip(sources).take(turns.streams) {
             *view = memory.view(*source, *count)?;
         }
-        let rows = BodyRows { views, turns, first: segment.done };
+        let rows = BodyRows { views, turns, rows, first: segment.done };
         let bad = rows.without_shape(records, self.decoded.masses.len());
         Some(bad.map_or(records, |body| body - segment.done))
     }

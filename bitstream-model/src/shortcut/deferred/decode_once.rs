@@ -5,6 +5,7 @@
 //! buffer: the device owns it, and no one else writes to it.
 
 use super::eligible::{BEATS_MAX, Layout};
+use super::warm::{self, Brings, Kind};
 use crate::accelerator::control::{Arguments, Shape};
 use crate::accelerator::records::segment::{PacketError, Segment};
 use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
@@ -19,6 +20,28 @@ use pgs_interface::record::Beat;
 /// Beats that are about to come to a stream: where from, and how many.
 pub(crate) type Coming = [Option<(Source, usize)>; STREAMS_MAX];
 
+/// The beats on the streams, and the ones about to come behind them.
+#[derive(Debug)]
+pub(super) struct Upcoming<'a> {
+    pub(super) inputs: &'a [Stream],
+    pub(super) coming: &'a Coming,
+}
+
+impl Upcoming<'_> {
+    /// Where the beats `ahead` places behind the front of a stream are, and how many together.
+    pub(super) fn piece(&self, k: usize, ahead: usize, most: usize) -> (usize, Option<Source>) {
+        let there = self.inputs[k].len();
+        match self.coming[k] {
+            _ if ahead < there => self.inputs[k].piece(ahead, most),
+            Some((source, count)) => {
+                let at = ahead - there;
+                (count.saturating_sub(at).min(most), Some(source.further(at as u64)))
+            }
+            None => (0, None),
+        }
+    }
+}
+
 /// The collisions of a step, decoded as far as they are known.
 #[derive(Debug)]
 pub(super) struct Decoded {
@@ -28,8 +51,13 @@ pub(super) struct Decoded {
     pub(super) batch: Batch,
     /// Mass properties of each shape.
     pub(super) masses: Vec<Mass>,
-    /// Where the beats of the decoded collisions are, stream by stream.
+    /// Where the beats of the decoded collisions are, stream by stream. [`Kind`] says it for the
+    /// stream on which impulses come.
     origin: [Spans; STREAMS_MAX],
+    /// Whether the first pass brings impulses, and which.
+    pub(super) first: Brings,
+    /// The passes by the impulses that they bring.
+    pub(super) kinds: [Kind; Brings::ALL],
     /// Element `n` is the sum of all words of the first `n` collisions.
     sums: Vec<u32>,
     /// Why the decoder refused the collision after the last decoded one.
@@ -42,9 +70,11 @@ impl Decoded {
         Self {
             layout,
             translation: (!layout.in_place).then(|| Translation::new(layout)),
-            batch: batch.of(layout.precision, layout.together),
+            batch: batch.of(layout.precision, layout.together).with_inertia(layout.inertia),
             masses: Vec::new(),
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
+            first: Brings::Nothing,
+            kinds: std::array::from_fn(|_| Kind::new()),
             sums: vec![0],
             refused: None,
         }
@@ -60,6 +90,11 @@ impl Decoded {
             inverse_inertia: [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
         }));
         self.origin.iter_mut().for_each(Spans::clear);
+        self.first = Brings::of(arguments, 0);
+        let impulses = arguments.warm_start.then_some(collisions);
+        let [nothing, warm @ ..] = &mut self.kinds;
+        nothing.begin_step(None);
+        warm.iter_mut().for_each(|kind| kind.begin_step(impulses));
         if self.sums.len() <= collisions {
             self.sums.resize(collisions + 1, 0);
         }
@@ -67,8 +102,11 @@ impl Decoded {
     }
 
     /// Beats of an issue on each stream.
-    pub(super) fn share(&self) -> PerStream {
-        self.layout.share
+    pub(super) fn share(&self, brings: Brings) -> PerStream {
+        match (brings, self.layout.warm_share) {
+            (Brings::NormalImpulses | Brings::FrictionImpulses, Some(share)) => share,
+            _ => self.layout.share,
+        }
     }
 
     /// Collisions that enter together.
@@ -82,8 +120,13 @@ impl Decoded {
     }
 
     /// The streams of the design, and the beats of an issue on each.
-    fn shares(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        self.share().into_iter().enumerate().filter(|(_, share)| *share > 0)
+    fn shares(&self, brings: Brings) -> impl Iterator<Item = (usize, usize)> + use<> {
+        self.share(brings).into_iter().enumerate().filter(|(_, share)| *share > 0)
+    }
+
+    /// Where the beats of the decoded collisions are on a stream.
+    fn origin(&self, brings: Brings, k: usize) -> &Spans {
+        if k == warm::STREAM { &self.kinds[brings as usize].origin } else { &self.origin[k] }
     }
 
     /// The least number of issues between two decoded collisions that share a body that moves.
@@ -91,9 +134,9 @@ impl Decoded {
         self.batch.distance() as usize
     }
 
-    /// Collisions that are decoded.
-    pub(super) fn known(&self) -> usize {
-        self.batch.len()
+    /// Collisions that are decoded, and known in passes that bring the same.
+    pub(super) fn known(&self, brings: Brings) -> usize {
+        self.kinds[brings as usize].known
     }
 
     /// Why the decoder refused the collision after the last decoded one, if it did.
@@ -101,38 +144,24 @@ impl Decoded {
         self.refused
     }
 
-    /// Decodes the collisions on the streams and the ones about to come behind them. The segment
-    /// says which collisions of the first pass are next.
+    /// Decodes the upcoming collisions of the first pass. The segment says which ones are next.
     pub(super) fn decode_ahead(
         &mut self,
         segment: &Segment,
-        inputs: &[Stream],
-        coming: &Coming,
+        upcoming: &Upcoming<'_>,
         shape_of: &[u8],
         memory: &Memory,
     ) {
-        let total = segment.done + segment.left();
-        // Where the beats `ahead` places behind the front of a stream are, and how many together.
-        let piece = |k: usize, ahead: usize, most: usize| {
-            let there = inputs[k].len();
-            match coming[k] {
-                _ if ahead < there => inputs[k].piece(ahead, most),
-                Some((source, count)) => {
-                    let at = ahead - there;
-                    (count.saturating_sub(at).min(most), Some(source.further(at as u64)))
-                }
-                None => (0, None),
-            }
-        };
-        while self.refused.is_none() && self.known() < total {
+        let (brings, total) = (self.first, segment.done + segment.left());
+        while self.refused.is_none() && self.known(brings) < total {
             // All decoded issues are whole ones.
-            let known = self.known();
+            let known = self.known(brings);
             let first = self.issues(known);
-            let share_of = self.share();
+            let share_of = self.share(brings);
             let ahead = |k: usize| (first - self.issues(segment.done)) * share_of[k];
             let mut issues = self.issues(total) - first;
-            for (k, share) in self.shares() {
-                issues = issues.min(piece(k, ahead(k), issues * share).0 / share);
+            for (k, share) in self.shares(brings) {
+                issues = issues.min(upcoming.piece(k, ahead(k), issues * share).0 / share);
             }
             // An issue whose beats are not together is gathered.
             let apart = issues == 0;
@@ -141,9 +170,9 @@ impl Decoded {
             let mut streams: [&[Beat]; STREAMS_MAX] = [&[]; STREAMS_MAX];
             let mut sources = [[None; BEATS_MAX]; STREAMS_MAX];
             let step = |share: usize| if apart { 1 } else { issues * share };
-            for (k, share) in self.shares() {
+            for (k, share) in self.shares(brings) {
                 for at in (0..issues * share).step_by(step(share)) {
-                    let (count, source) = piece(k, ahead(k) + at, step(share));
+                    let (count, source) = upcoming.piece(k, ahead(k) + at, step(share));
                     let view = source.and_then(|source| memory.view(source, count));
                     let Some(view) = view.filter(|view| view.len() == step(share)) else { return };
                     if apart {
@@ -154,10 +183,14 @@ impl Decoded {
                     sources[k][at] = source;
                 }
             }
-            for (k, share) in self.shares() {
+            for (k, share) in self.shares(brings) {
                 let first = (first * share) as u64;
+                let origin = match k {
+                    warm::STREAM => &mut self.kinds[brings as usize].origin,
+                    _ => &mut self.origin[k],
+                };
                 for (at, source) in (0..).zip(sources[k].into_iter().flatten()) {
-                    self.origin[k].push(first + at, step(share) as u64, source);
+                    origin.push(first + at, step(share) as u64, source);
                 }
                 if apart {
                     streams[k] = &gathered[k][..share];
@@ -166,36 +199,55 @@ impl Decoded {
             let records = (issues * self.together()).min(total - known);
             let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
             let (shapes, masses) = (shape_of, &self.masses);
+            let batch = &mut self.batch;
             let decoded = match &mut self.translation {
                 Some(translation) => {
-                    translation.decode(&mut self.batch, streams, records, shapes, masses, sums)
+                    translation.decode(batch, streams, records, shapes, masses, sums)
                 }
-                None => self.batch.decode(streams, records, shapes, masses, sums),
+                None if brings == Brings::Nothing => {
+                    batch.decode(streams, records, shapes, masses, sums)
+                }
+                None => batch.decode_warm(streams, records, shapes, masses, sums),
             };
             self.refused = decoded.err();
+            let decoded = self.batch.len() - known;
             let mut sum = *before;
-            for each in &mut sums[..self.batch.len() - known] {
+            for each in &mut sums[..decoded] {
                 sum = sum.wrapping_add(*each);
                 *each = sum;
             }
+            let impulses = streams[warm::STREAM];
+            let beats = impulses.len().min(decoded * share_of[warm::STREAM]);
+            self.take_impulses(brings, known, &impulses[..beats]);
+            self.kinds[brings as usize].known = self.batch.len();
         }
     }
 
     /// The sum of all words of `records` collisions. The first one begins an issue.
-    pub(super) fn sum(&self, first: usize, records: usize) -> u32 {
-        self.sums[first + records].wrapping_sub(self.sums[first])
+    pub(super) fn sum(&self, brings: Brings, first: usize, records: usize) -> u32 {
+        let sum = self.sums[first + records].wrapping_sub(self.sums[first]);
+        match brings {
+            Brings::Nothing => sum,
+            _ => sum.wrapping_add(self.kinds[brings as usize].sum(first, records)),
+        }
     }
 
     /// Whether the next `records` collisions on the streams are the decoded ones, as far as their
     /// beats have come: more may have come on one stream than on another.
-    pub(super) fn same(&self, segment: &Segment, records: usize, inputs: &[Stream]) -> bool {
-        self.shares().all(|(k, share)| {
+    pub(super) fn same(
+        &self,
+        brings: Brings,
+        segment: &Segment,
+        records: usize,
+        inputs: &[Stream],
+    ) -> bool {
+        self.shares(brings).all(|(k, share)| {
             let first = (self.issues(segment.done) * share) as u64;
             let most = (self.issues(records) * share).min(inputs[k].len());
             let mut at = 0;
             while at < most {
                 let (count, source) = inputs[k].piece(at, most - at);
-                let same = |from| self.origin[k].holds(first + at as u64, count, from);
+                let same = |from| self.origin(brings, k).holds(first + at as u64, count, from);
                 if count == 0 || !source.is_some_and(same) {
                     return false;
                 }
@@ -207,13 +259,19 @@ impl Decoded {
 
     /// Whether the beats about to come to the streams go on with the decoded collisions, as far as
     /// they belong to the segment.
-    pub(super) fn goes_on(&self, segment: &Segment, inputs: &[Stream], coming: &Coming) -> bool {
-        self.shares().all(|(k, share)| {
+    pub(super) fn goes_on(
+        &self,
+        brings: Brings,
+        segment: &Segment,
+        inputs: &[Stream],
+        coming: &Coming,
+    ) -> bool {
+        self.shares(brings).all(|(k, share)| {
             let Some((source, count)) = coming[k] else { return false };
             let next = self.issues(segment.done) * share + inputs[k].len();
             let all = self.issues(segment.done + segment.left());
             let left = (all * share).saturating_sub(next);
-            self.origin[k].holds(next as u64, count.min(left), source)
+            self.origin(brings, k).holds(next as u64, count.min(left), source)
         })
     }
 }

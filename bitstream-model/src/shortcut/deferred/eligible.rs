@@ -17,6 +17,7 @@ pub(crate) struct Layout {
     pub(crate) format: StreamFormat,
     /// The precision of all arithmetic.
     pub(crate) precision: Precision,
+    pub(crate) inertia: Inertia,
     /// Collisions of an issue; padding completes the last issue. Where it is two, records are in
     /// world coordinates and sixteen bits.
     pub(crate) together: usize,
@@ -26,8 +27,12 @@ pub(crate) struct Layout {
     pub(crate) places: [(usize, usize); BEATS_MAX],
     /// Whether a batch takes the beats as they are, without conversion.
     pub(crate) in_place: bool,
+    /// Beats of a collision on each stream in a pass that brings impulses, if these can be taken.
+    pub(crate) warm_share: Option<PerStream>,
     /// How velocities, poses and results lie on the streams, if all three take turns on them.
     pub(crate) bodies: Option<Turns>,
+    /// Rows of a body's velocity.
+    pub(crate) velocity_rows: usize,
 }
 
 impl Layout {
@@ -42,7 +47,7 @@ impl Layout {
         } else {
             return None;
         };
-        let computed = variant.inertia == Inertia::Isotropic
+        let computed = (variant.inertia == Inertia::Isotropic || precision == Precision::F32)
             && matches!(profile.flow, Flow::Passes)
             && config.subnormals == Subnormals::Keep
             && config.hazards == Hazards::Interlocked;
@@ -76,15 +81,44 @@ impl Layout {
         if as_it_is && !in_place {
             return None;
         }
-        let Stripes { velocities, poses, results, .. } = profile.stripes;
+        let Stripes { warm_collisions, velocities, poses, results, .. } = profile.stripes;
+        let warm_share = warm_collisions
+            .filter(|_| in_place)
+            .and_then(|stripe| warm_share(&stripe, widths, profile.initiation_interval.into()));
         let of = |stripe: &Stripe, widths: &[u32]| Turns::of(stripe, widths.len());
         let wide = widths.iter().chain(profile.s2mm_widths).all(|width| beat_cycles(*width) == 1);
         let bodies = of(&velocities, widths)
             .filter(|_| wide && precision == Precision::F32)
             .filter(|turns| of(&poses, widths) == Some(*turns))
             .filter(|turns| of(&results, profile.s2mm_widths) == Some(*turns));
-        Some(Self { format, precision, together, share, places, in_place, bodies })
+        let (inertia, velocity_rows) = (variant.inertia, variant.velocity_rows());
+        Some(Self {
+            format,
+            precision,
+            inertia,
+            together,
+            share,
+            places,
+            in_place,
+            warm_share,
+            bodies,
+            velocity_rows,
+        })
     }
+}
+
+/// Beats on each stream of a collision with its impulses, if the collision lies on the streams as in the
+/// other passes, the impulses lie behind it, and it comes in an interval.
+fn warm_share(stripe: &Stripe, widths: &[u32], interval: u64) -> Option<PerStream> {
+    const BEATS: usize = collision::WARM_ROWS;
+    let striping = Striping::new(stripe, widths);
+    let mut walk = striping.places(0);
+    let mut places = [(0, 0); BEATS];
+    places.fill_with(|| walk.take());
+    let [record @ .., impulses] = places;
+    let known = record == batch::PLACES && impulses == batch::IMPULSES;
+    let whole = BEATS.is_multiple_of(stripe.streams.len());
+    (known && whole && striping.cycles(BEATS) <= interval).then(|| striping.counts(BEATS))
 }
 
 #[cfg(test)]
@@ -101,12 +135,23 @@ mod tests {
         let float = layout(&FLOAT).expect("it has short cuts");
         assert!(float.in_place);
         assert_eq!(float.bodies, Some(Turns { streams: 4 }));
-        assert_eq!(float.share, [2, 2, 2, 1]);
+        assert_eq!((float.share, float.warm_share), ([2, 2, 2, 1], Some([2; 4])));
         let mixed = layout(&MIXED).expect("it has short cuts");
-        assert!(!mixed.in_place);
+        assert!(!mixed.in_place && mixed.warm_share.is_none());
         assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
         assert_eq!(mixed.share, [1, 1, 1, 0]);
         assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn world_inertia_takes_the_same_way_where_numbers_have_thirty_two_bits() {
+        for profile in [&FLOAT, &MIXED] {
+            let inertia = Inertia::World;
+            let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+            let layout = Layout::of(&config).expect("it has short cuts");
+            assert_eq!((layout.inertia, layout.velocity_rows), (inertia, 4));
+            assert!(layout.bodies.is_some());
+        }
     }
 
     #[test]
@@ -151,7 +196,7 @@ mod tests {
         }
         let usual = BoardConfig { profile: &MIXED, ..BoardConfig::default() };
         for config in [
-            BoardConfig { inertia: Inertia::World, ..usual },
+            BoardConfig { inertia: Inertia::World, profile: &HALF, ..usual },
             BoardConfig { hazards: Hazards::Unchecked, ..usual },
             BoardConfig { subnormals: Subnormals::Flush, ..usual },
         ] {
@@ -164,6 +209,18 @@ mod tests {
         }
         static ACROSS: Profile = striped(&[0, 1], MIXED);
         static WITHOUT: Profile = striped(&[0, 1, 0], MIXED);
+        // A step with impulses alone does, where these lie elsewhere or make a record too long.
+        const fn warm(streams: &'static [u8], interval: u32) -> Profile {
+            let stripe = Stripe { streams, padded: false };
+            let stripes = FLOAT.stripes.with_warm_collisions(stripe);
+            Profile { stripes, initiation_interval: interval, ..FLOAT }
+        }
+        static BEFORE: Profile = warm(&[3, 0, 1, 2], 2);
+        static LONG: Profile = warm(&[0, 1, 2, 3], 1);
+        for profile in [&BEFORE, &LONG] {
+            let layout = layout(profile).expect("its collisions have short cuts");
+            assert_eq!(layout.warm_share, None);
+        }
         static OTHER: Profile = striped(&[0, 1, 2, 3, 2, 1, 0], FLOAT);
         for profile in [&ACROSS, &WITHOUT, &OTHER] {
             assert!(layout(profile).is_none(), "{:?}", profile.stripes.collisions);

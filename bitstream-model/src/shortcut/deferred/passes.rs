@@ -1,8 +1,8 @@
-//! Goes through passes whose collisions are decoded: when each collision enters, and which part of
-//! the passes is computed at last.
+//! Goes through passes whose collisions are decoded: when each collision enters.
 
 use super::Deferred;
-use super::decode_once::Coming;
+use super::decode_once::{Coming, Upcoming};
+use super::warm::Brings;
 use crate::accelerator::Accelerator;
 use crate::accelerator::defer::ArrivedRecords;
 use crate::accelerator::records::segment::{PacketError, Segment};
@@ -33,16 +33,24 @@ impl Deferred {
         segment: &mut Segment,
         limit: u64,
         ArrivedRecords { records: arrived, inputs, memory }: ArrivedRecords<'_>,
+        outputs: &mut [Stream],
     ) -> Result<Option<u64>, PacketError> {
-        self.decode_ahead(accelerator, pass, segment, inputs, &Coming::default(), memory);
+        let brings = Brings::of(&accelerator.arguments, pass);
+        let upcoming = Upcoming { inputs, coming: &Coming::default() };
+        self.decode_ahead(accelerator, pass, segment, &upcoming, memory);
         let decoded = &self.decoded;
         let (together, interval) = (decoded.together(), self.entered.interval());
-        let known = arrived.min(decoded.known() - segment.done);
+        let known = arrived.min(decoded.known(brings) - segment.done);
         let refused = decoded.refused().filter(|_| known < arrived);
-        if !decoded.same(segment, known, inputs) || known < arrived && refused.is_none() {
+        let same = decoded.same(brings, segment, known, inputs);
+        if !same
+            || known < arrived && refused.is_none()
+            || !self.impulses_are_there(accelerator, pass)
+        {
             self.give_up(accelerator, pass, segment.done, inputs, memory);
             return Ok(None);
         }
+        let decoded = &self.decoded;
         let (mut cycles, mut records) = (0, 0);
         if self.entered.even() {
             let fit = usize::try_from(limit / interval).unwrap_or(usize::MAX);
@@ -64,7 +72,10 @@ impl Deferred {
             self.active = false;
             return Err(error);
         }
-        self.take_beats(accelerator, segment, records, inputs);
+        if accelerator.arguments.sends_impulses(pass) {
+            self.send_impulses(accelerator, pass, segment.done, records, outputs);
+        }
+        self.take_beats(accelerator, brings, segment, records, inputs);
         Ok(Some(cycles))
     }
 
@@ -75,15 +86,17 @@ impl Deferred {
         accelerator: &mut Accelerator,
         pass: u32,
         segment: &Segment,
-        inputs: &[Stream],
-        coming: &Coming,
+        upcoming: &Upcoming<'_>,
         memory: &Memory,
     ) {
+        let Self { decoded, entered, .. } = self;
+        let brings = Brings::of(&accelerator.arguments, pass);
         if pass == 0 {
-            let Self { decoded, entered, .. } = self;
-            decoded.decode_ahead(segment, inputs, coming, &accelerator.shape_of, memory);
+            decoded.decode_ahead(segment, upcoming, &accelerator.shape_of, memory);
             let pipeline = &mut accelerator.pipeline;
             entered.distance_is(decoded.distance(), &decoded.batch, pipeline);
+        } else if brings != decoded.first {
+            decoded.follow(brings, segment, upcoming, memory);
         }
     }
 
@@ -119,36 +132,13 @@ impl Deferred {
     fn take_beats(
         &self,
         accelerator: &mut Accelerator,
+        brings: Brings,
         segment: &mut Segment,
         records: usize,
         inputs: &mut [Stream],
     ) {
-        accelerator.received(self.decoded.sum(segment.done, records));
+        accelerator.received(self.decoded.sum(brings, segment.done, records));
         segment.skip(records, inputs);
-    }
-
-    /// Computes the passes before `pass`, and the first `collisions` of `pass`.
-    pub(super) fn compute_to(
-        &mut self,
-        accelerator: &mut Accelerator,
-        pass: u32,
-        collisions: usize,
-    ) {
-        if !self.active {
-            return;
-        }
-        let contact = accelerator.arguments.contact_iterations;
-        let parameters = &accelerator.arguments.solver;
-        let passes = self.computed..pass;
-        let (batch, masses) = (&mut self.decoded.batch, &self.decoded.masses);
-        let (shapes, velocities) = (&accelerator.shape_of, &mut accelerator.velocities);
-        batch.run(passes, contact, parameters, shapes, masses, velocities);
-        if collisions > 0 {
-            let part = 0..collisions;
-            batch.run_part(pass, part, contact, parameters, shapes, masses, velocities);
-        }
-        self.computed = pass;
-        accelerator.counters.impulse_sum = batch.impulse_sum();
     }
 
     /// Leaves the rest of the step to the accelerator, from collision `next` of `pass` on.
@@ -163,7 +153,7 @@ impl Deferred {
         log::debug!("accelerator: pass {pass} brings other beats from collision {next} on");
         self.entered.end_even(&self.decoded.batch, &mut accelerator.pipeline);
         self.compute_to(accelerator, pass, next);
-        let known = self.decoded.known();
+        let known = self.decoded.batch.len();
         let impulses = &mut accelerator.impulses;
         impulses.clear();
         impulses.resize(accelerator.arguments.collisions as usize, [0.0; CONTACT_POINTS]);
@@ -186,19 +176,22 @@ impl Deferred {
         coming: &Coming,
         memory: &Memory,
     ) -> Option<Ahead> {
-        let (left, share) = (self.decoded.issues(segment.left()), self.decoded.share());
+        let brings = Brings::of(&accelerator.arguments, pass);
+        let (left, share) = (self.decoded.issues(segment.left()), self.decoded.share(brings));
         let within = |(stream, share): (&Stream, usize)| stream.len() <= left * share;
         if !inputs.iter().zip(share).all(within) {
             return None;
         }
-        self.decode_ahead(accelerator, pass, segment, inputs, coming, memory);
+        self.decode_ahead(accelerator, pass, segment, &Upcoming { inputs, coming }, memory);
         let decoded = &self.decoded;
         let together = decoded.together();
         let there = segment.available(inputs) / together * together;
-        let known = decoded.known() - segment.done;
+        let known = decoded.known(brings) - segment.done;
         let same = there <= known
-            && decoded.same(segment, known, inputs)
-            && decoded.goes_on(segment, inputs, coming);
+            && decoded.same(brings, segment, known, inputs)
+            && decoded.goes_on(brings, segment, inputs, coming)
+            && self.impulses_are_there(accelerator, pass);
+        let decoded = &self.decoded;
         let (even, interval) = (self.entered.even(), self.entered.interval());
         let stall_max = if even { 0 } else { u64::from(accelerator.depth(pass).window) };
         same.then_some(Ahead {
@@ -235,10 +228,12 @@ impl Deferred {
     pub(crate) fn pass_over_issues(
         &self,
         accelerator: &mut Accelerator,
+        pass: u32,
         segment: &mut Segment,
         issues: usize,
         inputs: &mut [Stream],
     ) {
-        self.take_beats(accelerator, segment, issues * self.decoded.together(), inputs);
+        let brings = Brings::of(&accelerator.arguments, pass);
+        self.take_beats(accelerator, brings, segment, issues * self.decoded.together(), inputs);
     }
 }

@@ -11,9 +11,11 @@ use crate::accelerator::records::segment::Segment;
 use crate::accelerator::records::striping::{ROWS_IN, STREAMS_MAX};
 use crate::board::short_cut::{ShortCut, Stretch};
 use crate::memory::Source;
-use crate::shortcut::deferred::{Ahead, BodyRows, Coming, Deferred};
+use crate::shortcut::deferred::{BodyRows, Coming, Deferred};
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
+use pgs_interface::record::velocity;
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Where the next beats of each input are, the ones in its FIFO before the ones about to come, and
 /// how many.
@@ -23,13 +25,23 @@ type Sources = [(Source, usize); STREAMS_MAX];
 #[derive(Debug)]
 pub(crate) struct FastForward {
     deferred: Deferred,
-    /// The recorded flow of the collisions.
-    periods: Periods,
+    periods: PerPass,
+}
+
+/// The recorded flows of the collisions, of each kind of pass.
+#[derive(Debug)]
+struct PerPass {
+    usual: Periods,
+    /// With impulses that come in.
+    warm: Periods,
+    /// With impulses that go out.
+    sending: Periods,
 }
 
 impl FastForward {
     pub(crate) fn new(deferred: Deferred) -> Self {
-        Self { deferred, periods: Periods::new() }
+        let [usual, warm, sending] = [(); 3].map(|()| Periods::new());
+        Self { deferred, periods: PerPass { usual, warm, sending } }
     }
 }
 
@@ -112,14 +124,20 @@ fn coming(Stretch { now, cores, memory, .. }: &Stretch<'_>) -> Option<Coming> {
 /// Lets the collisions of a pass flow; returns the cycles that have passed.
 fn collisions(
     deferred: &mut Deferred,
-    periods: &mut Periods,
+    periods: &mut PerPass,
     mut stretch: Stretch<'_>,
     number: u32,
     mut segment: Segment,
 ) -> Option<u64> {
     let now = stretch.now;
-    if !outputs_rest(&stretch) || !deferred.takes_collisions() {
+    let arguments = &stretch.accelerator.arguments;
+    let (warm, sends) = (arguments.is_warm(number), arguments.sends_impulses(number));
+    if !deferred.takes_collisions() || !sends && !outputs_rest(&stretch) {
         return None;
+    }
+    let mut writes = [(0, 0); STREAMS_MAX];
+    if sends {
+        writes[IMPULSES_STREAM] = impulses_leave(&stretch)?;
     }
     let coming = coming(&stretch)?;
     let Stretch { accelerator, inputs, memory, .. } = &mut stretch;
@@ -129,25 +147,59 @@ fn collisions(
         Limits { cycles: stretch.until - now, records: ahead.issues, beats: PerEngine::default() };
     for (k, beats) in coming.iter().enumerate() {
         limits.beats[2 * k] = beats.map_or(0, |(_, beats)| beats);
+        limits.beats[2 * k + 1] = writes[k].1;
     }
     let mut flow = begin(&stretch, limits);
-    let Ahead { last, .. } = ahead;
     let accelerator = &mut *stretch.accelerator;
-    let mut issues = Issues { accelerator, deferred, ahead, done: segment.done };
-    match last {
-        Some(last) => flow.run_evenly(&mut issues, last, periods),
-        None => flow.run(&mut issues),
+    let done = segment.done;
+    if sends {
+        let issues = Issues::<true> { accelerator, deferred, ahead, done };
+        run(&mut flow, issues, &mut periods.sending);
+    } else {
+        let issues = Issues::<false> { accelerator, deferred, ahead, done };
+        run(&mut flow, issues, if warm { &mut periods.warm } else { &mut periods.usual });
     }
     let Flowed { cycles, waits, records, .. } = flow.flowed;
     if cycles == 0 {
         return None;
     }
+    if sends {
+        let Stretch { accelerator, outputs, memory, .. } = &mut stretch;
+        writes[IMPULSES_STREAM].1 = flow.flowed.beats[2 * IMPULSES_STREAM + 1];
+        let (_, mut places) = memory.lend(Sources::default(), writes)?;
+        let place = std::mem::take(&mut places[IMPULSES_STREAM]);
+        deferred.pass_over_impulses(accelerator, number, (done, records), outputs, place);
+    }
     pass_cores(&mut stretch, &flow);
     let Stretch { accelerator, inputs, .. } = stretch;
     pass_inputs(inputs, &flow, &coming);
-    deferred.pass_over_issues(accelerator, &mut segment, records, inputs);
+    deferred.pass_over_issues(accelerator, number, &mut segment, records, inputs);
     accelerator.pass_over(cycles, waits, Phase::Pass { number, segment });
     Some(cycles)
+}
+
+/// Lets the issues of a pass flow.
+fn run<const IMPULSES: bool>(
+    flow: &mut Flow,
+    mut issues: Issues<'_, IMPULSES>,
+    periods: &mut Periods,
+) {
+    match issues.ahead.last {
+        Some(last) => flow.run_evenly(&mut issues, last, periods),
+        None => flow.run(&mut issues),
+    }
+}
+
+/// Where the next impulses go, and for how many there is room, if nothing happens on the outputs but that
+/// these leave.
+fn impulses_leave(stretch: &Stretch<'_>) -> Option<(u64, usize)> {
+    let Stretch { now, cores, outputs, memory, .. } = stretch;
+    let others = || (0..cores.len()).filter(|k| *k != IMPULSES_STREAM);
+    let rest = others().all(|k| {
+        outputs.get(k).is_none_or(|output| output.len() == 0) && cores[k].rests_without_beats(*now)
+    });
+    let (at, beats) = cores[IMPULSES_STREAM].undisturbed(Direction::S2mm, *now)?;
+    (rest && memory.may_write(at, beats)).then_some((at, beats))
 }
 
 /// Lets bodies flow, which are loaded, or integrated with these results; returns the cycles that
@@ -159,6 +211,7 @@ fn bodies(
     results: Option<Results>,
 ) -> Option<u64> {
     let turns = deferred.bodies()?;
+    let rows_of_body = if results.is_some() { ROWS_IN } else { deferred.rows_of_velocity() };
     if results.is_none() && !outputs_rest(&stretch) {
         return None;
     }
@@ -167,7 +220,7 @@ fn bodies(
     let mut limits = Limits {
         cycles: stretch.until - stretch.now,
         // The last bodies end packets.
-        records: (segment.left() + 1).saturating_sub(turns.streams.div_ceil(ROWS_IN)),
+        records: (segment.left() + 1).saturating_sub(turns.streams.div_ceil(rows_of_body)),
         beats: PerEngine::default(),
     };
     let mut writes = [(0, 0); STREAMS_MAX];
@@ -186,29 +239,25 @@ fn bodies(
     }
     let mut flow = begin(&stretch, limits);
     let done = segment.done;
-    match (turns.streams, results.is_some()) {
-        (4, false) => flow.run(&mut Bodies::<4, false> { done }),
-        (4, true) => flow.run(&mut Bodies::<4, true> { done }),
-        (3, false) => flow.run(&mut Bodies::<3, false> { done }),
-        (3, true) => flow.run(&mut Bodies::<3, true> { done }),
-        (2, false) => flow.run(&mut Bodies::<2, false> { done }),
-        (2, true) => flow.run(&mut Bodies::<2, true> { done }),
-        (_, false) => flow.run(&mut Bodies::<1, false> { done }),
-        (_, true) => flow.run(&mut Bodies::<1, true> { done }),
+    match turns.streams {
+        4 => flow_of::<4>(&mut flow, done, rows_of_body, results.is_some()),
+        3 => flow_of::<3>(&mut flow, done, rows_of_body, results.is_some()),
+        2 => flow_of::<2>(&mut flow, done, rows_of_body, results.is_some()),
+        _ => flow_of::<1>(&mut flow, done, rows_of_body, results.is_some()),
     }
     let Flowed { cycles, waits, records, beats } = flow.flowed;
     if cycles == 0 {
         return None;
     }
     let mut reads = sources;
-    let [before, after] = [done, done + records].map(|bodies| turns.counts(ROWS_IN * bodies));
+    let [before, after] = [done, done + records].map(|bodies| turns.counts(rows_of_body * bodies));
     for k in 0..stretch.cores.len() {
         reads[k].1 = after[k] - before[k];
         writes[k].1 = beats[2 * k + 1];
     }
     let Stretch { accelerator, inputs, outputs, memory, .. } = &mut stretch;
     let (views, places) = memory.lend(reads, writes)?;
-    let rows = BodyRows { views, turns, first: done };
+    let rows = BodyRows { views, turns, rows: rows_of_body, first: done };
     pass_inputs(inputs, &flow, &coming);
     let phase = match results {
         None => {
@@ -232,6 +281,17 @@ fn bodies(
     accelerator.pass_over(cycles, waits, phase);
     pass_cores(&mut stretch, &flow);
     Some(cycles)
+}
+
+/// Lets bodies of `rows` rows each flow on `STREAMS` streams.
+fn flow_of<const STREAMS: usize>(flow: &mut Flow, done: usize, rows: usize, results: bool) {
+    match (rows, results) {
+        (_, true) => flow.run(&mut Bodies::<STREAMS, ROWS_IN, true> { done }),
+        (velocity::WORLD_ROWS, false) => {
+            flow.run(&mut Bodies::<STREAMS, { velocity::WORLD_ROWS }, false> { done });
+        }
+        (_, false) => flow.run(&mut Bodies::<STREAMS, ROWS_IN, false> { done }),
+    }
 }
 
 /// The next beats of each input, if the ones in its FIFO lie before the ones about to come, in the

@@ -2,8 +2,9 @@
 
 use super::PerEngine;
 use crate::accelerator::Accelerator;
-use crate::accelerator::records::striping::{PerStream, ROWS_IN, ROWS_OUT, STREAMS_MAX, Turns};
+use crate::accelerator::records::striping::{PerStream, ROWS_OUT, STREAMS_MAX, Turns};
 use crate::shortcut::deferred::{Ahead, Deferred};
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Records that flow one after the other: the bodies of a phase, or the issues of a pass. They are
 /// numbered from the first one of the flow.
@@ -25,9 +26,9 @@ pub(super) trait Records {
     fn enter(&mut self, first: usize, records: usize, cycles: u64) -> u64;
 }
 
-/// The issues of a pass.
+/// The issues of a pass, whose impulses may go out.
 #[derive(Debug)]
-pub(super) struct Issues<'a> {
+pub(super) struct Issues<'a, const IMPULSES: bool> {
     pub(super) accelerator: &'a mut Accelerator,
     pub(super) deferred: &'a mut Deferred,
     pub(super) ahead: Ahead,
@@ -46,12 +47,16 @@ pub(super) fn issues_held(share: &PerStream, held: &PerEngine) -> usize {
     issues
 }
 
-impl Records for Issues<'_> {
-    const RESULTS: bool = false;
+impl<const IMPULSES: bool> Records for Issues<'_, IMPULSES> {
+    const RESULTS: bool = IMPULSES;
 
     #[inline(always)]
-    fn ready(&self, _first: usize, held: &PerEngine, _depth: usize) -> usize {
-        issues_held(&self.ahead.share, held)
+    fn ready(&self, _first: usize, held: &PerEngine, depth: usize) -> usize {
+        let issues = issues_held(&self.ahead.share, held);
+        if !IMPULSES {
+            return issues;
+        }
+        issues.min(depth - held[2 * IMPULSES_STREAM + 1])
     }
 
     #[inline(always)]
@@ -61,7 +66,11 @@ impl Records for Issues<'_> {
 
     #[inline(always)]
     fn beats(&self, _first: usize, records: usize) -> (PerStream, PerStream) {
-        (self.ahead.share.map(|share| records * share), [0; STREAMS_MAX])
+        let mut given = [0; STREAMS_MAX];
+        if IMPULSES {
+            given[IMPULSES_STREAM] = records;
+        }
+        (self.ahead.share.map(|share| records * share), given)
     }
 
     #[inline(always)]
@@ -71,15 +80,15 @@ impl Records for Issues<'_> {
     }
 }
 
-/// Bodies that are loaded, or leave with their results, on streams that take turns. The number of
-/// streams divides every count of beats: it is a constant.
+/// Bodies of `ROWS` rows each that are loaded, or leave with their results, on streams that take turns. The
+/// number of streams divides every count of beats: it is a constant.
 #[derive(Debug)]
-pub(super) struct Bodies<const STREAMS: usize, const RESULTS: bool> {
+pub(super) struct Bodies<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> {
     /// Bodies of the phase before the flow.
     pub(super) done: usize,
 }
 
-impl<const STREAMS: usize, const RESULTS: bool> Bodies<STREAMS, RESULTS> {
+impl<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> Bodies<STREAMS, ROWS, RESULTS> {
     const TURNS: Turns = Turns { streams: STREAMS };
 
     /// `count` of the rows before the first of some bodies, and of the rows up to the last one.
@@ -99,14 +108,16 @@ impl<const STREAMS: usize, const RESULTS: bool> Bodies<STREAMS, RESULTS> {
     }
 }
 
-impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESULTS> {
+impl<const STREAMS: usize, const ROWS: usize, const RESULTS: bool> Records
+    for Bodies<STREAMS, ROWS, RESULTS>
+{
     const RESULTS: bool = RESULTS;
 
     #[inline(always)]
     fn ready(&self, first: usize, held: &PerEngine, depth: usize) -> usize {
         let body = self.done + first;
-        let came = Self::TURNS.counts(ROWS_IN * body);
-        let there = Self::TURNS.contiguous(|k| came[k] + held[2 * k]) / ROWS_IN - body;
+        let came = Self::TURNS.counts(ROWS * body);
+        let there = Self::TURNS.contiguous(|k| came[k] + held[2 * k]) / ROWS - body;
         if !RESULTS {
             return there;
         }
@@ -118,7 +129,7 @@ impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESU
     /// A row a cycle on each stream: a result takes longer than its pose.
     #[inline(always)]
     fn cycles_max(&self, first: usize, records: usize) -> u64 {
-        let rows = if RESULTS { ROWS_OUT } else { ROWS_IN };
+        let rows = if RESULTS { ROWS_OUT } else { ROWS };
         let [before, after] = self.rows(first, records, rows, |rows| Self::TURNS.cycles(rows));
         after - before
     }
@@ -127,7 +138,7 @@ impl<const STREAMS: usize, const RESULTS: bool> Records for Bodies<STREAMS, RESU
     fn beats(&self, first: usize, records: usize) -> (PerStream, PerStream) {
         let given =
             if RESULTS { self.beats_of(first, records, ROWS_OUT) } else { [0; STREAMS_MAX] };
-        (self.beats_of(first, records, ROWS_IN), given)
+        (self.beats_of(first, records, ROWS), given)
     }
 
     #[inline(always)]

@@ -20,6 +20,7 @@ mod growth;
 mod process;
 mod profiles;
 mod solver;
+mod world;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -65,6 +66,8 @@ enum Section {
     Solver,
     /// Time of a step in each design, without short cuts and by default
     Profiles,
+    /// Time of a step with world inertia, warm start and pair friction beside one without
+    World,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
     /// Cost of packing on a Cortex-A53, on paper (docs/a53-cost.md)
@@ -111,9 +114,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     document.insert("schema".to_owned(), 1.into());
     document.insert("bench".to_owned(), "speed".into());
     document.insert("runs".to_owned(), options.common.runs().into());
-    let sections: [(Section, &str, Measure); 7] = [
+    let sections: [(Section, &str, Measure); 8] = [
         (Section::Solver, "solver", solver::measure),
         (Section::Profiles, "profiles", profiles::measure),
+        (Section::World, "world", world::measure),
         (Section::Instructions, "instructions", callgrind::measure),
         (Section::A53, "a53", a53::measure),
         (Section::Growth, "growth", growth::measure),

@@ -200,12 +200,41 @@ impl Batch {
         masses: &[Mass],
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
+        let records = Records { streams, warm: false, pair_friction: self.pair_friction };
+        self.decode_records(&records, count, shape_of, masses, sums)
+    }
+
+    /// The same for records of a warm pass, of two beats on each stream: the impulses on the last one are
+    /// not read, nor do the sums count them.
+    ///
+    /// # Errors
+    ///
+    /// As [`decode`](Self::decode).
+    pub(crate) fn decode_warm(
+        &mut self,
+        streams: [&[Beat]; 4],
+        count: usize,
+        shape_of: &[u8],
+        masses: &[Mass],
+        sums: &mut [u32],
+    ) -> Result<(), PacketError> {
+        let records = Records { streams, warm: true, pair_friction: self.pair_friction };
+        self.decode_records(&records, count, shape_of, masses, sums)
+    }
+
+    fn decode_records(
+        &mut self,
+        records: &Records<'_>,
+        count: usize,
+        shape_of: &[u8],
+        masses: &[Mass],
+        sums: &mut [u32],
+    ) -> Result<(), PacketError> {
         let moves = |body: usize| masses[usize::from(shape_of[body])].inverse_mass != 0.0;
         self.places.bodies(shape_of.len(), moves);
         self.bodies = self.bodies.max(shape_of.len());
         self.measured = false;
         self.spins = false;
-        let records = Records { streams, pair_friction: self.pair_friction };
         let mut at = 0;
         while at < count {
             // A group begins at most one block for each of its records.
@@ -215,7 +244,7 @@ impl Batch {
             }
             let first_block = self.places.blocks();
             let mut intake = Intake {
-                records,
+                records: *records,
                 count,
                 width: self.width,
                 places: &mut self.places,
@@ -233,7 +262,7 @@ impl Batch {
             share(&mut intake, &mut self.crew);
             let refused = intake.refused;
             at = intake.at;
-            self.put(&records, sums);
+            self.put(records, sums);
             if let Some(error) = refused {
                 return Err(error);
             }

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::Batch;
 use super::block::{LANES, ROWS_APART};
-use super::wavefront::Line;
+use super::line::Line;
 use super::width::Width;
 use crate::accelerator::arithmetic::number::Single;
 use crate::accelerator::integrate::{Integration, integrate};
@@ -72,7 +72,7 @@ impl Bodies<'_> {
         mut places: ResultPlaces<'_>,
     ) -> [u32; 2] {
         let turns = Turns { streams: STREAMS };
-        let period = const { period(STREAMS) };
+        let period = const { period(STREAMS, ROWS_IN) };
         // In a group, the bodies at each place of a period fill all lanes.
         let group = period * LANES;
         let mut sums = [0; 2];
@@ -224,7 +224,7 @@ impl<const STREAMS: usize> Work for Groups<'_, STREAMS> {
         let Self { integration, rows, poses, places, sums } = self;
         let constants = Constants::new(integration);
         let Constants { zero, one, time_step: dt, damping, fall, .. } = constants;
-        let period = const { period(STREAMS) };
+        let period = const { period(STREAMS, ROWS_IN) };
         // Beats of a period on each stream.
         let (came, goes) = (period * ROWS_IN / STREAMS, period * ROWS_OUT / STREAMS);
         let turns = Turns { streams: STREAMS };

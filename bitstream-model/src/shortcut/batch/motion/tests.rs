@@ -1,5 +1,6 @@
 //! Bodies side by side, against one after the other.
 
+use super::super::Properties;
 use super::*;
 use crate::accelerator::solver::{Mass, Velocity};
 
@@ -63,12 +64,14 @@ fn results(
     }
     let mut batch = Batch::with_width(threads, width);
     batch.begin(0, false);
-    batch.enter(&velocities, &shape_of, &masses);
+    let properties = Properties { shape_of: &shape_of, masses: &masses, inertias: &[] };
+    batch.enter(&velocities, properties);
     let mut places = [const { Vec::new() }; STREAMS_MAX];
     for (place, beats) in places.iter_mut().zip(beats_of_results(turns, bodies.clone())) {
         place.resize(beats, Beat::default());
     }
-    let poses = BodyRows { views: poses.each_ref().map(Vec::as_slice), turns, first: from };
+    let poses =
+        BodyRows { views: poses.each_ref().map(Vec::as_slice), turns, rows: ROWS_IN, first: from };
     let room = places.each_mut().map(Vec::as_mut_slice);
     let sums = batch.integrate(integration, bodies.clone(), poses, room);
     let before = turns.counts(ROWS_OUT * first);
