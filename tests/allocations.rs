@@ -79,9 +79,12 @@ fn open_for(config: BoardConfig, pack_threads: Option<usize>) -> Accelerator {
 
 /// Runs ten steps. Returns the allocations of each.
 fn allocations(config: BoardConfig, order: Option<Order>) -> Vec<u64> {
+    allocations_with(config, StepParameters::default().with_order(order))
+}
+
+fn allocations_with(config: BoardConfig, parameters: StepParameters) -> Vec<u64> {
     let mut accelerator = open(config);
     let (mut bodies, collisions) = scene();
-    let parameters = StepParameters::default().with_order(order);
     let mut counted = Vec::with_capacity(10);
     for step in 0..10 {
         // The number of collisions changes, as it does in a moving scene.
@@ -153,6 +156,17 @@ fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
     for (config, order) in [(BoardConfig::default(), Some(Order::HazardFree)), (unchecked, None)] {
         let counted = allocations(config, order);
         assert_eq!(counted[3..], [0; 7], "{:?} {order:?}: {counted:?}", config.hazards);
+    }
+}
+
+#[test]
+fn steps_with_impulses_allocate_nothing_either() {
+    let out = StepParameters::default().with_impulses_out(true);
+    for name in ["float", "naive"] {
+        for parameters in [out, out.with_warm_start(true)] {
+            let counted = allocations_with(profile(name), parameters);
+            assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
+        }
     }
 }
 

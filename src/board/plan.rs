@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Collisions come last, so that a step may have fewer of them than its buffers have room for. In a
-//! warm pass one channel carries an impulse behind each collision's beats; the others send what they
-//! send in every other pass.
+//! warm pass one channel carries an impulse behind each collision's beats; the others send the same
+//! beats in every pass.
 
 use std::ops::Range;
 use std::time::Duration;

@@ -13,9 +13,9 @@ pub enum Phase {
     Load,
     /// The collisions go in, once for all passes.
     Collisions,
-    /// The collisions go in for a contact pass, from 1.
+    /// The collisions go in for a contact pass, from 1; a warm pass is the first.
     Contact(u32),
-    /// The collisions go in for a friction pass, from 1.
+    /// The collisions go in for a friction pass, from 1; a warm pass is the first.
     Friction(u32),
     /// The poses go in.
     Poses,

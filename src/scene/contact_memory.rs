@@ -211,7 +211,8 @@ mod tests {
         let normals = found.iter().map(|of| of.normal.map(f32::to_bits));
         let expected = [[3.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0]].map(|of| of.map(f32::to_bits));
         assert!(normals.eq(expected), "{found:?}");
-        assert!(found[0].friction != [0.0; 2] && found[1].friction == [0.0; 2], "{found:?}");
+        let rubs = |of: &Impulses| of.friction.iter().any(|impulse| *impulse != 0.0);
+        assert!(rubs(&found[0]) && !rubs(&found[1]), "{found:?}");
     }
 
     #[test]

@@ -95,7 +95,8 @@ impl Ordering {
         let window = IssueWindow::of(context.capabilities, parameters)?;
         let mut input = self.buffers.gather(bodies, collisions, context.shapes);
         let empty = input.pairs.len() - input.collisions();
-        if design.is_some() && parameters.passes().total() == 0 {
+        let passes = u32::try_from(parameters.passes().total()).unwrap_or(u32::MAX);
+        if design.is_some() && passes == 0 {
             // Without a pass the board takes no collisions.
             input.pairs = &[];
         }

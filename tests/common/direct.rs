@@ -239,7 +239,7 @@ pub(crate) fn direct_step(
     direct_step_from(None, bodies, collisions, shapes, parameters);
 }
 
-/// A step that begins with impulses, one record a collision; returns those that it ends with.
+/// A step that begins with impulses, one record a collision; returns the impulses at its end.
 pub(crate) fn direct_step_from(
     given: Option<&[Impulses]>,
     bodies: &mut [Body],

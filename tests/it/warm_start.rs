@@ -2,6 +2,8 @@
 //! every order, and holds its passes, bytes and cycles against the specification.
 #![cfg(feature = "emulation")]
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use crate::common::direct::{direct_step, direct_step_from};
 use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered};
@@ -10,8 +12,8 @@ use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WI
 use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan, Hazards};
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
 use zynq_pgs::{
-    Accelerator, Body, Collision, Error, Excess, Fault, Impulses, InputError, StepParameters,
-    WarmCollisions,
+    Accelerator, Body, Collision, Collisions, Error, Excess, Fault, Impulses, InputError,
+    StepParameters, WarmCollisions,
 };
 
 fn words(impulses: &[Impulses]) -> &[u32] {
@@ -292,6 +294,106 @@ fn a_prepared_step_starts_warm_and_the_impulses_of_the_one_before_are_read_meanw
     started.wait(&mut right).expect("the second step");
     assert_eq!((bits(&left), bits(&right)), (bits(&cold), bits(&expected)));
     assert_eq!(words(accelerator.impulses()), words(&hot));
+}
+
+/// Collisions that answer otherwise from the second read of each on.
+struct Changing<'a> {
+    collisions: &'a [Collision],
+    reads: Vec<AtomicU32>,
+}
+
+impl Collisions for Changing<'_> {
+    fn len(&self) -> usize {
+        self.collisions.len()
+    }
+
+    fn collision(&self, index: usize) -> Collision {
+        let mut collision = self.collisions[index];
+        if self.reads[index].fetch_add(1, Ordering::Relaxed) > 0 {
+            collision.contacts[0].point[0] = f32::NAN;
+        }
+        collision
+    }
+}
+
+#[test]
+fn collisions_that_change_between_the_reads_of_a_warm_step_are_refused() {
+    let (bodies, collisions) = scene(5);
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let (board, mut accelerator) = open_with(config, None, &shapes());
+    let reads = collisions.iter().map(|_| AtomicU32::new(0)).collect();
+    let changing = Changing { collisions: &collisions, reads };
+    let refused = accelerator.step(&mut bodies.clone(), &changing, &warm(Order::AsGiven));
+    assert!(matches!(refused, Err(Error::Input(_))), "{refused:?}");
+    assert_eq!(board.violations(), []);
+}
+
+#[test]
+fn written_collisions_give_impulses_out_and_begin_with_none() {
+    let (bodies, collisions) = world();
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let (_board, mut accelerator) = open_with(config, None, &shapes());
+    let parameters = ordered(Order::AsGiven).with_impulses_out(true);
+    let mut expected = bodies.clone();
+    let impulses = direct_step_from(None, &mut expected, &collisions, &shapes(), &parameters);
+    // Fewer than announced.
+    let announced = collisions.len() + 100;
+    let written = accelerator.write(&bodies, announced, &parameters, |records| {
+        collisions.iter().for_each(|collision| records.push(collision));
+    });
+    let mut found = bodies.clone();
+    let step = written.expect("written");
+    accelerator.start(&step).expect("started").wait(&mut found).expect("a step");
+    assert_eq!(bits(&found), bits(&expected));
+    assert_eq!(words(accelerator.impulses()), words(&impulses));
+    let refused = accelerator.write(&bodies, 1, &parameters.with_warm_start(true), |_| ());
+    let refused = refused.expect_err("written collisions come without impulses");
+    assert!(matches!(refused, Error::Input(InputError::WrittenWarm)), "{refused}");
+    assert!(!refused.to_string().contains("  "), "{refused}");
+}
+
+#[test]
+fn an_impulse_that_is_corrupted_on_its_way_back_fails_the_step() {
+    let (bodies, collisions) = scene(5);
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let (board, mut accelerator) = open_with(config, None, &shapes());
+    let parameters = ordered(Order::AsGiven).with_impulses_out(true);
+    accelerator.step(&mut bodies.clone(), &collisions, &parameters).expect("a step");
+    let before = accelerator.impulses().to_vec();
+    let plan: FaultPlan =
+        "corrupt=0x00000001@dma0.s2mm,phase=results,beat=2".parse().expect("a plan");
+    board.inject(plan);
+    let mut found = bodies.clone();
+    let error = accelerator.step(&mut found, &collisions, &parameters).expect_err("a wrong sum");
+    assert!(
+        matches!(&error, Error::Step { fault, .. } if matches!(**fault, Fault::Checksum { .. })),
+        "{error}"
+    );
+    assert_eq!(bits(&found), bits(&bodies));
+    assert_eq!(words(accelerator.impulses()), words(&before));
+}
+
+#[test]
+fn impulses_that_diverge_fail_the_step_and_name_the_collision() {
+    let (bodies, collisions) = scene(5);
+    let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    let (_board, mut accelerator) = open_with(config, None, &shapes());
+    let mut impulses = vec![Impulses::ZERO; collisions.len()];
+    impulses[7].normal[0] = f32::MAX;
+    impulses[9].normal[0] = f32::MAX;
+    let warm = WarmCollisions { collisions: &collisions, impulses: &impulses };
+    // No friction pass: an infinite sum would make the velocities infinite first.
+    let parameters = ordered(Order::AsGiven)
+        .with_warm_start(true)
+        .with_impulses_out(true)
+        .with_friction_iterations(0);
+    let mut found = bodies.clone();
+    let error = accelerator.step(&mut found, &warm, &parameters).expect_err("it diverges");
+    let named =
+        |fault: &Fault| matches!(fault, Fault::NotFinite { .. } | Fault::ImpulseNotFinite { .. });
+    assert!(matches!(&error, Error::Step { fault, .. } if named(fault)), "{error}");
+    assert_eq!(bits(&found), bits(&bodies));
+    assert!(accelerator.impulses().is_empty());
 }
 
 #[test]

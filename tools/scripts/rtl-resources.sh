@@ -53,10 +53,10 @@ table() {
 rule() {
 	local operator
 	for operator in fmul fdiv; do
-		synthesise with "$operator"
+		synthesise base "$operator"
 		parameters='-set SMALLEST_NORMAL 0' synthesise without "$operator"
 	done
-	attend python3 tools/scripts/rtl_resources.py --rule "$work/with" "$work/without" \
+	attend python3 tools/scripts/rtl_resources.py --rule "$work/base" "$work/without" \
 		"$work"/base/{pgs_top,contact,friction,integration}.json
 }
 
@@ -73,8 +73,7 @@ if [ $# = 0 ]; then
 	echo
 	echo "The same with $MOST_COLLISIONS collisions"
 	table most 880
-	generate with
-	generate without --smallest-normal dropped
+	cp -r "$work/base" "$work/without"
 	echo
 	rule
 fi

@@ -26,12 +26,12 @@ public:
     // Makes collisions and bodies of everything taken. False if the masses and inertias do not fit into the
     // board's table.
     bool gather(const btContactSolverInfo &info);
-    // Gives every body taken its velocity: that in bodies(), or by its forces if it is in no collision.
+    // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision.
     void writeVelocities(const btContactSolverInfo &info);
     // Puts the collisions in reverse order.
     void reverse();
-    // Makes impulses() of those in Bullet's points, times `factor`; without friction where those are not the
-    // board's. Before the friction goes into the collisions' counts.
+    // Makes impulses() from the impulses in Bullet's points, times `factor`; without friction where Bullet's
+    // tangents are in the points. Before the friction goes into the collisions' counts.
     void loadImpulses(float factor, bool withFriction);
     // Stores impulses() in Bullet's points.
     void storeImpulses();

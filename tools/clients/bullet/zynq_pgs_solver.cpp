@@ -180,8 +180,8 @@ void ZynqPgsSolver::loadImpulses(const btContactSolverInfo &info, zpgs_parameter
     m_gather.loadImpulses(warm ? float(info.m_warmstartingFactor) : 0.0f, m_frictionIsBoards);
 }
 
-// A step, warm if it is asked for and the board can. A board without impulses refuses such a step before
-// anything is sent, and takes it without them.
+// A step, warm if it is asked for and the board can. A board without impulses refuses a step that gives
+// them out before anything is sent, and takes it without them.
 zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions, zpgs_parameters &parameters,
                                 zpgs_report &report) {
     const bool asked = parameters.impulses_out != 0;
@@ -189,11 +189,16 @@ zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions
     if (status == ZPGS_STATUS_OK && asked) m_boardImpulses = Impulses::Has;
     if (status != ZPGS_STATUS_INPUT || !asked || m_boardImpulses == Impulses::Has) return status;
 
-    parameters.warm_start = 0;
-    parameters.impulses_out = 0;
-    const zpgs_status cold = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
-    if (cold == ZPGS_STATUS_OK) m_boardImpulses = Impulses::Lacks;
-    return cold;
+    // The impulses themselves may be wrong, or the board may have none.
+    for (const bool out : {true, false}) {
+        parameters.warm_start = 0;
+        parameters.impulses_out = out;
+        const zpgs_status cold = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+        if (cold == ZPGS_STATUS_INPUT && out) continue;
+        if (cold == ZPGS_STATUS_OK) m_boardImpulses = out ? Impulses::Has : Impulses::Lacks;
+        return cold;
+    }
+    return status;
 }
 
 void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {

@@ -25,7 +25,8 @@ struct ZynqPgsOptions {
     // that rests on four points has two. With 4 the step has down to half as many collisions, and piles and
     // towers are less stable.
     int pointsPerCollision = 2;
-    // Every so many steps the collisions go to the library in reverse order; 0 is never. Towers lean less.
+    // Every `reverseEvery` steps the collisions go to the library in reverse order; 0 is never. Towers lean
+    // less.
     int reverseEvery = 3;
     // One of zpgs_order.
     uint32_t order = ZPGS_ORDER_AUTOMATIC;
@@ -41,7 +42,7 @@ struct ZynqPgsCounts {
     // Steps that the board solved, and steps that Bullet's solver took over from it.
     uint64_t boardSteps = 0;
     uint64_t fallbackSteps = 0;
-    // Of those on the board, the steps that began with impulses.
+    // Steps on the board that began with impulses.
     uint64_t warmSteps = 0;
     // Groups of islands with joints, which are Bullet's without a fault.
     uint64_t jointGroups = 0;

@@ -9,6 +9,9 @@ use zynq_pgs::emulation::Build;
 use crate::failure::Failure;
 use crate::numbers::grouped;
 
+/// A contact of a scene that has moved further than this from one step to the next is a new one, m.
+pub(crate) const CONTACT_REACH: f32 = 0.05;
+
 /// Default drop, m: the pile lands within half a second.
 const DROP: f32 = 1.0;
 

@@ -45,3 +45,29 @@ pub fn files(design: &Design) -> Vec<File> {
     files.push(file("pgs_vivado.tcl", vivado::numbers(design)));
     files
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Parameters;
+
+    /// Instances that leave the rule of the smallest normal number out, in the whole design.
+    fn without_rule(smallest_normal: bool) -> usize {
+        let parameters = Parameters { smallest_normal, ..Parameters::default() };
+        let files = files(&Design::new(parameters));
+        files.iter().map(|file| file.text.matches("#(.SMALLEST_NORMAL(0)) f").count()).sum()
+    }
+
+    #[test]
+    fn every_multiplier_and_divider_of_a_pipeline_follows_the_rule_or_none_does() {
+        let design = Design::new(Parameters::default());
+        let rounding = design
+            .pipelines()
+            .iter()
+            .flat_map(|pipeline| &pipeline.schedule.units)
+            .filter(|unit| unit.operation.operator().smallest_normal)
+            .count();
+        assert!(rounding > 200, "{rounding}");
+        assert_eq!((without_rule(true), without_rule(false)), (0, rounding));
+    }
+}

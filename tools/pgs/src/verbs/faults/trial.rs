@@ -17,6 +17,7 @@ use super::expected::Expected;
 use crate::board;
 use crate::common::AcceleratorChoice;
 use crate::failure::Failure;
+use crate::options::scenes::CONTACT_REACH;
 
 /// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for a
 /// millisecond; for reading all registers after a timeout; and for the reset of all parts.
@@ -28,8 +29,6 @@ const RECOVERY: Duration = Duration::from_millis(60);
 const LENGTH_WIDTH: u32 = 8;
 /// FIFOs so short that a channel cannot run ahead of the accelerator by a whole step.
 const FIFO_BEATS: usize = 16;
-/// Reach of a contact from one step to the next, m.
-const REACH: f32 = 0.05;
 /// Steps until cubes dropped from 0.05 m lie on each other.
 const SETTLING: u32 = 12;
 
@@ -170,7 +169,7 @@ impl State {
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
         let parameters = start.parameters();
-        let mut memory = ContactMemory::new(REACH);
+        let mut memory = ContactMemory::new(CONTACT_REACH);
         for _ in 0..SETTLING {
             scene.detect();
             let (bodies, collisions) = scene.parts_mut();

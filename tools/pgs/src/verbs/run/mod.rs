@@ -23,7 +23,7 @@ use crate::options::bandwidth::bandwidth_text;
 use crate::options::build::BuildArgs;
 use crate::options::ordering::OrderingArgs;
 use crate::options::planned::PlannedArgs;
-use crate::options::scenes::SceneArgs;
+use crate::options::scenes::{CONTACT_REACH, SceneArgs};
 use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
 use crate::output::SCHEMA;
 use crate::output::facts::fact;
@@ -58,8 +58,6 @@ step on the board, modelled for an emulated board; time of this machine.";
 
 /// Default rows of the table.
 const ROWS: u32 = 15;
-/// A contact that has moved further than this from one step to the next is a new one, m.
-const REACH: f32 = 0.05;
 /// Default contact and friction iterations of a step: enough to carry 30 layers.
 const ITERATIONS: u32 = 10;
 
@@ -172,7 +170,7 @@ fn take_steps(
     let progress = progress_bar(args.steps);
     let variant = opened.accelerator.capabilities().variant;
     let mut course = Course::default();
-    let mut memory = args.warm_start.then(|| ContactMemory::new(REACH));
+    let mut memory = args.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
     while course.done < args.steps && !interrupt.is_set() {
         let row =
             step(course.done + 1, parameters, &mut opened.accelerator, scene, memory.as_mut())
