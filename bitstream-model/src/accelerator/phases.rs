@@ -158,7 +158,6 @@ impl Accelerator {
     }
 
     /// Takes the collisions that have arrived, for up to `limit` cycles.
-    #[expect(clippy::too_many_arguments, reason = "the streams of both directions, and the seam")]
     pub(super) fn pass(
         &mut self,
         number: u32,
