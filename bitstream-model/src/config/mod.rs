@@ -406,7 +406,6 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
                     of.streams.iter().copied().cycle().take(rows).collect::<Vec<_>>()
                 };
                 !stripe(&warm, profile.mm2s_widths)
-                    || profile.collisions_per_issue != 1
                     || beats(&warm, collision::ROWS) != beats(&stripes.collisions, collision::ROWS)
             }),
             "a warm stripe that begins as the stripe of the collisions is expected",

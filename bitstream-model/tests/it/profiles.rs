@@ -442,12 +442,18 @@ fn a_profile_that_contradicts_itself_is_refused_with_what_is_expected() {
         profile.stripes.poses = Stripe { streams: &[0, 4], padded: false };
         profile
     };
+    static OTHER_WARM: Profile = {
+        let mut profile = FLOAT;
+        profile.stripes.collisions = Stripe { streams: &[3, 2, 1, 0, 3, 2, 1], padded: false };
+        profile
+    };
     for (profile, expected) in [
         (&NO_STREAM, "1 to 4 streams"),
         (&ODD_WIDTH, "32, 64 or 128 bits"),
         (&NO_ISSUE, "at least one cycle"),
         (&NO_CLOCK, "at least 1 kHz"),
         (&BEYOND, "streams that exist"),
+        (&OTHER_WARM, "a warm stripe that begins as the stripe of the collisions"),
     ] {
         let text = refusal(config(profile));
         assert!(text.contains("profile \"float\"") && text.contains(expected), "{text}");
