@@ -349,8 +349,8 @@ enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
                            struct zpgs_report *report);
 
 // Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. Not while a
-// step is in flight. For the warm start of the next step, sounds, damage.
+// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. For the warm
+// start of the next step, sounds, damage.
 //
 // # Safety
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
@@ -380,17 +380,23 @@ enum zpgs_status zpgs_prepare(struct zpgs_accelerator *accelerator,
                               const struct zpgs_parameters *parameters);
 
 // Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
-// flight: the results are read while the board works on the next step, which is then in flight.
+// flight: the results are read while the board works on the next step.
 //
-// The call returns the first failure. If the step in flight has failed and the prepared one was
-// started all the same, `zpgs_wait` ends it as any other; if none is in flight afterwards,
-// `zpgs_wait` says so with `ZPGS_STATUS_SEQUENCE`.
+// The status is that of the step that has ended. `started` gets the status of the start, and a step
+// is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before: `zpgs_wait`
+// ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started because the
+// call was refused. `zpgs_last_error` has the text of the step that has ended or, if that is done, of
+// the start.
+//
+// `report` may be null.
 //
 // # Safety
-// As `zpgs_step`.
+// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during the
+// call.
 enum zpgs_status zpgs_wait_and_start(struct zpgs_accelerator *accelerator,
                                      const struct zpgs_bodies *bodies,
-                                     struct zpgs_report *report);
+                                     struct zpgs_report *report,
+                                     enum zpgs_status *started);
 
 // Starts the prepared step, with none in flight. It may be started again, as after a fault.
 //

@@ -95,11 +95,12 @@ fn the_driver_steps_on_an_accelerator_in_another_process() {
     let files = tempfile::tempdir().expect("a folder");
     let path = program(files.path(), "");
     for both in [false, true] {
+        // The model beside it has the extensions of the simulator.
+        let mut config = config();
         let mut accelerator: Box<dyn ExternalAccelerator> =
-            Box::new(SimulatorProcess::start(&path).expect("a simulator"));
+            Box::new(SimulatorProcess::start_for(&mut config, &path).expect("a simulator"));
         if both {
-            accelerator =
-                Box::new(LockStep::new(&config(), accelerator, None).expect("a lock step"));
+            accelerator = Box::new(LockStep::new(&config, accelerator, None).expect("a lock step"));
         }
         let board = board(accelerator);
         let (error, untouched) = step(&board, &golden("two_cubes"));
