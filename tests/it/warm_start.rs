@@ -374,7 +374,7 @@ fn an_impulse_that_is_corrupted_on_its_way_back_fails_the_step() {
 }
 
 #[test]
-fn impulses_that_diverge_fail_the_step_and_name_the_collision() {
+fn impulses_that_diverge_fail_the_step_and_change_nothing() {
     let (bodies, collisions) = scene(5);
     let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
     let (_board, mut accelerator) = open_with(config, None, &shapes());

@@ -349,8 +349,8 @@ enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
                            struct zpgs_report *report);
 
 // Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. For the warm
-// start of the next step, sounds, damage.
+// order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is the number
+// of collisions of that step. For the warm start of the next step, sounds, damage.
 //
 // # Safety
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as

@@ -177,20 +177,12 @@ pub unsafe extern "C" fn zpgs_step(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
-        let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `collisions` is null or leads to its structure; no thread writes the array in it during
-        // the call.
-        let collisions = unsafe { read_collisions(collisions) }?;
-        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
-        // during the call.
-        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
-        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
-        // uses.
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
+        // call alone uses the bodies, and no thread writes the others.
+        let (mut bodies, collisions, parameters) =
+            unsafe { read_input(bodies, collisions, parameters) }?;
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
-        let parameters = parameters.driver()?;
-        check_impulses(&collisions, &parameters)?;
         let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
@@ -213,17 +205,10 @@ pub unsafe extern "C" fn zpgs_submit(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
-        let bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `collisions` is null or leads to its structure; no thread writes the array in it during
-        // the call.
-        let collisions = unsafe { read_collisions(collisions) }?;
-        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
-        // during the call.
-        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
-        let parameters = parameters.driver()?;
-        check_impulses(&collisions, &parameters)?;
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
+        // call alone uses the bodies, and no thread writes the others.
+        let (bodies, collisions, parameters) =
+            unsafe { read_input(bodies, collisions, parameters) }?;
         state.submit(&bodies, &collisions, &parameters)
     })
 }
@@ -250,8 +235,7 @@ pub unsafe extern "C" fn zpgs_wait(
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
         // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
-        // uses.
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let done = state.wait(&mut bodies)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
@@ -260,8 +244,8 @@ pub unsafe extern "C" fn zpgs_wait(
 }
 
 /// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-/// order of its collisions: `count` `zpgs_impulses`, as many as the step had collisions. For the warm
-/// start of the next step, sounds, damage.
+/// order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is the number
+/// of collisions of that step. For the warm start of the next step, sounds, damage.
 ///
 /// # Safety
 /// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
@@ -307,7 +291,7 @@ pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> S
 }
 
 /// Refuses a warm start without impulses, which would be a cold one that takes longer.
-pub(crate) fn check_impulses(
+fn check_impulses(
     collisions: &CollisionsView<'_>,
     parameters: &StepParameters,
 ) -> Result<(), Failure> {
@@ -318,6 +302,26 @@ pub(crate) fn check_impulses(
         ));
     }
     Ok(())
+}
+
+/// Reads and checks the input of a step.
+///
+/// # Safety
+/// Each pointer is null or leads to its structure, with the size in it, whose arrays are as it describes.
+pub(crate) unsafe fn read_input<'a>(
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+) -> Result<(BodiesView, CollisionsView<'a>, StepParameters), Failure> {
+    // SAFETY: the pointer is null or leads to the structure, whose arrays are as it describes: `# Safety`
+    // of this function.
+    let bodies = unsafe { read_bodies(bodies) }?;
+    // SAFETY: as above.
+    let collisions = unsafe { read_collisions(collisions) }?;
+    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this function.
+    let parameters = unsafe { memory::read(parameters, Parameters::default()) }?.driver()?;
+    check_impulses(&collisions, &parameters)?;
+    Ok((bodies, collisions, parameters))
 }
 
 /// Reads and checks the caller's bodies.
@@ -345,7 +349,7 @@ pub(crate) unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesVie
 ///
 /// # Safety
 /// The pointer is null or leads to the structure, whose array is as it describes.
-pub(crate) unsafe fn read_collisions<'a>(
+unsafe fn read_collisions<'a>(
     pointer: *const CollisionArray,
 ) -> Result<CollisionsView<'a>, Failure> {
     let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };

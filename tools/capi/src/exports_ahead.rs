@@ -4,7 +4,7 @@
 
 use crate::arrays::{BodyArrays, CollisionArray};
 use crate::barrier::call_with;
-use crate::exports::{check_impulses, read_bodies, read_collisions};
+use crate::exports::{read_bodies, read_input};
 use crate::handle::AcceleratorHandle;
 use crate::memory::{self, Out};
 use crate::parameters::Parameters;
@@ -28,17 +28,10 @@ pub unsafe extern "C" fn zpgs_prepare(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
-        let bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `collisions` is null or leads to its structure; no thread writes the arrays in it during
-        // the call.
-        let collisions = unsafe { read_collisions(collisions) }?;
-        // SAFETY: `parameters` is null or leads to as many bytes as its `size` says, which no thread writes
-        // during the call.
-        let parameters = unsafe { memory::read(parameters, Parameters::default()) }?;
-        let parameters = parameters.driver()?;
-        check_impulses(&collisions, &parameters)?;
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
+        // call alone uses the bodies, and no thread writes the others.
+        let (bodies, collisions, parameters) =
+            unsafe { read_input(bodies, collisions, parameters) }?;
         state.prepare(&bodies, &collisions, &parameters)
     })
 }
@@ -74,8 +67,7 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
         // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `report` is null or leads to as many bytes as its `size` says, which this call alone
-        // uses.
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let (done, start) = state.wait_and_start(&mut bodies)?;
         let status = start.as_ref().err().map_or(Status::Ok, |failure| failure.status);

@@ -30,7 +30,7 @@ pub(crate) type InertiaRow = [Quad; 2];
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
     pub(crate) bodies: *mut BodyRow,
-    /// With world inertia as many as bodies; else never read.
+    /// With world inertia a row for each row of `bodies`. Without it no code reads them.
     pub(crate) inertias: *const InertiaRow,
 }
 
@@ -154,7 +154,8 @@ fn tested(block: &Block, bit: u32) -> Mask {
 ///
 /// # Safety
 ///
-/// `rows` are indices into the rows at `from`, and no other thread writes these rows at the same time.
+/// Each of `rows` is below the number of rows at `from`, and no other thread writes these rows during the
+/// call.
 #[inline(always)]
 unsafe fn gathered(
     instructions: impl Instructions,
@@ -175,8 +176,8 @@ unsafe fn gathered(
 ///
 /// # Safety
 ///
-/// `indices` are indices into the rows of all bodies, and no other thread writes these rows at the same
-/// time.
+/// Each of `indices` is below the number of rows at `rows.bodies`, and in a form about axes below the number
+/// at `rows.inertias`. No other thread writes these rows during the call.
 #[inline(always)]
 unsafe fn side<A: Arithmetic, F: Form>(
     arithmetic: A,
@@ -185,11 +186,13 @@ unsafe fn side<A: Arithmetic, F: Form>(
     indices: &Words<u32>,
 ) -> Side<A, F::Side<A>> {
     let of = |columns: [F32x16; 4]| columns.map(|numbers| arithmetic.of(numbers));
-    // SAFETY: the caller promises both for the rows of the bodies.
+    // SAFETY: the caller promises that `rows.bodies` has a row for each index, and that no other thread
+    // writes it.
     let [linear, angular] = unsafe { gathered(instructions, rows.bodies, indices) };
     let ([x, y, z, m], [p, q, r, beside]) = (of(linear), of(angular));
     let k = if F::ABOUT_AXES {
-        // SAFETY: the caller promises that every body has a row, and no thread writes an inertia.
+        // SAFETY: the form is about axes: the caller promises that `rows.inertias` has a row for each index,
+        // and that no other thread writes it.
         let [diagonal, others] = unsafe { gathered(instructions, rows.inertias, indices) };
         F::about_axes(of(diagonal), of(others))
     } else {
@@ -227,8 +230,9 @@ unsafe fn put_side<A: Arithmetic, K>(
 ///
 /// # Safety
 ///
-/// The block's rows and the spare one are indices into `rows`. While this runs, no other thread writes the
-/// block's rows, and none reads the rows of its moving bodies or the spare one.
+/// The block's rows and the spare one are below the number of rows at `rows.bodies`, and in a form about axes
+/// the block's rows are below the number at `rows.inertias`, too. During the call no other thread writes the
+/// block's rows in either array, and none reads the rows of its moving bodies or the spare one.
 #[inline(always)]
 pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     arithmetic: A,
@@ -241,9 +245,11 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = arithmetic.of(counts);
-    // SAFETY: the caller promises that the block's rows exist, and that no other thread writes them.
+    // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
+    // other thread writes them.
     let mut a = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[0]) };
-    // SAFETY: the caller promises that the block's rows exist, and that no other thread writes them.
+    // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
+    // other thread writes them.
     let mut b = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[1]) };
     if pass.stage.contact {
         contact(arithmetic, pass, block, given, counts, &mut a, &mut b);

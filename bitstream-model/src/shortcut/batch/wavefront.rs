@@ -335,14 +335,16 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
             let block = unsafe { &mut *block };
             let given = self.field.given::<WARM>(index);
             if block.serial() {
-                // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+                // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays; while the thread
                 // has the chunk, the rows of its bodies are its own: see `Sync`.
                 let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
                 *self.sum = self.sum.saturating_add(sum);
                 continue;
             }
             let arithmetic = F::arithmetic(instructions);
-            // SAFETY: the same holds for the rows of its bodies, and for the spare one.
+            // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays, and one to
+            // spare for each thread. While the thread has the chunk, the rows of its bodies are its own: see
+            // `Sync`.
             unsafe {
                 let rows = self.field.rows;
                 kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, given, rows);
@@ -362,7 +364,7 @@ impl<F: Computed, I: Form, const WARM: bool> ChunkWork<'_, F, I, WARM> {
             // SAFETY: and this one is the thread's: see `Sync`.
             let block = unsafe { &mut *block };
             let given = self.field.given::<WARM>(index);
-            // SAFETY: `Batch::run` has made a row for every body that was decoded; while the thread
+            // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays; while the thread
             // has the chunk, the rows of its bodies are its own: see `Sync`.
             let sum = unsafe { one_by_one::<F, I>(&self.pass, block, given, self.field.rows) };
             *self.sum = self.sum.saturating_add(sum);
@@ -408,9 +410,9 @@ unsafe fn one_by_one<F: Computed, I: Form>(
             let [[x, y, z, m], [p, q, r, k]] = unsafe { row.read() };
             velocities[side] = Velocity { linear: [x, y, z], angular: [p, q, r] };
             let inverse_inertia = I::stored(k, || {
-                // SAFETY: the caller promises that the row exists.
+                // SAFETY: the form is about axes: the caller promises that the row exists.
                 let row = unsafe { rows.inertias.add(index) };
-                // SAFETY: no thread writes an inertia.
+                // SAFETY: `run` has borrowed the inertias as a shared slice, so that no thread writes them.
                 unsafe { row.read() }
             });
             masses[side] = Mass { inverse_mass: m, inverse_inertia };

@@ -215,7 +215,7 @@ pub(super) fn of(bench: &Bench) -> (Vec<Cell>, Vec<Impossible>) {
     phases.dedup();
     let impossible = vec![
         Impossible {
-            what: "S2MM outside the results: it moves nothing there",
+            what: "S2MM outside its one packet: impulses and results",
             cells: kinds * phases.len() * receivers,
         },
         Impossible {
