@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{CONTACT_POINTS, Collision, Collisions};
+use crate::simd::prefetch;
 
 /// The impulses of a collision, accumulated over the passes of a step, N s.
 ///
@@ -35,19 +36,22 @@ impl Impulses {
     }
 
     /// The impulses without elements behind the number of points, which count for nothing.
+    #[inline]
     pub(crate) fn used(self, collision: &Collision) -> Self {
         let points = collision.points() as usize;
         if points == 0 {
             return Self::ZERO;
         }
-        let mut normal = self.normal;
-        normal.iter_mut().skip(points).for_each(|impulse| *impulse = 0.0);
-        Self { normal, ..self }
+        let of = |at: usize| if at < points { self.normal[at] } else { 0.0 };
+        Self { normal: std::array::from_fn(of), ..self }
     }
 
     /// Whether all are numbers.
+    #[inline]
     pub(crate) fn are_finite(&self) -> bool {
-        self.normal.iter().chain(&self.friction).all(|impulse| impulse.is_finite())
+        // Without a branch for each, as nearly all are.
+        let of = |all: bool, impulse: &f32| all & impulse.is_finite();
+        self.friction.iter().fold(self.normal.iter().fold(true, of), of)
     }
 }
 
@@ -76,6 +80,7 @@ impl<C: Collisions + ?Sized> Collisions for WarmCollisions<'_, C> {
 
     fn prefetch(&self, index: usize) {
         self.collisions.prefetch(index);
+        self.impulses.get(index).into_iter().for_each(prefetch);
     }
 
     fn lengths_agree(&self) -> bool {

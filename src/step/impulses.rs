@@ -32,25 +32,27 @@ impl ImpulsesOut {
         self.staged.resize(given, Impulses::ZERO);
         // The two change places when the step is committed: the next one then allocates nothing.
         self.committed.reserve(given.saturating_sub(self.committed.len()));
-        let (mut sum, mut broken) = (0_u32, None::<usize>);
+        let mut sums = [0_u32; 4];
+        let mut broken = None::<usize>;
         let contact = if plan.passes.contact > 0 { plan.collisions } else { 0 };
-        for (place, beat) in beats.iter().enumerate() {
-            sum = beat.0.into_iter().fold(sum, u32::wrapping_add);
-            let (entry, of_contact) = match place.checked_sub(contact) {
-                None => (place, true),
-                Some(entry) => (entry, false),
-            };
+        let (contact, friction) = beats.split_at(contact.min(beats.len()));
+        for entry in 0..contact.len().max(friction.len()) {
+            let [normal, tangential] = [contact, friction].map(|of| {
+                let words = of.get(entry).copied().unwrap_or_default().0;
+                for (sum, word) in sums.iter_mut().zip(words) {
+                    *sum = sum.wrapping_add(word);
+                }
+                words.map(f32::from_bits)
+            });
             let Some(collision) = collision_of(entry) else { continue };
             let Some(impulses) = self.staged.get_mut(collision) else { continue };
-            let words @ [first, second, ..] = beat.0.map(f32::from_bits);
-            match of_contact {
-                true => impulses.normal = words,
-                false => impulses.friction = [first, second],
-            }
+            let [first, second, ..] = tangential;
+            *impulses = Impulses { normal, friction: [first, second] };
             if !impulses.are_finite() {
                 broken = Some(broken.map_or(collision, |first| first.min(collision)));
             }
         }
+        let sum = sums.into_iter().fold(0, u32::wrapping_add);
         (sum, broken)
     }
 

@@ -87,7 +87,7 @@ impl Device {
         let warm = warm.map(|(channel, segments)| {
             let layout = Segment::WarmCollisions.layout(&plan.variant);
             let entries = (of_entries.collisions, of_entries.count);
-            let warm = pack_warm(&layout, channel, self.ends.ends(), entries, segments);
+            let warm = pack_warm(&layout, channel, self.ends.ends(), entries, segments, packers);
             // The caller's collisions must answer as they did when they were screened.
             seen.good &= !warm.broken && warm.records == collisions;
             warm

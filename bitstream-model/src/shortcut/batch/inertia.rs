@@ -4,10 +4,42 @@
 
 use std::fmt::Debug;
 
+use super::block::Words;
 use super::numbers::{Arithmetic, Numbers};
 use super::vector::{Vector, add, times};
 use crate::accelerator::arithmetic::inertia::{Inertia, Isotropic, Stored, World};
-use pgs_support::lanes::Quad;
+use pgs_support::lanes::{F32x16, LANES, Quad};
+
+/// Numbers of a symmetric matrix.
+const WORDS: usize = 6;
+
+/// The inverse inertias of the bodies of one side of a block about world axes: xx, yy, zz, xy, xz, yz.
+///
+/// Bodies keep their inverse inertia for a whole step. So the first pass gathers them, and the others find
+/// them beside their block.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(crate) struct SideInertias([Words; WORDS]);
+
+impl SideInertias {
+    pub(crate) const ZERO: Self = Self([[0.0; LANES]; WORDS]);
+
+    /// Keeps the words of rows: xx, yy, zz, 0, then xy, xz, yz, 0.
+    #[inline(always)]
+    pub(crate) fn put(&mut self, [diagonal, others]: [[F32x16; 4]; 2]) {
+        let ([xx, yy, zz, zero], [xy, xz, yz, zero_too]) = (diagonal, others);
+        // Whole numbers of 0 change nothing; but where the last column is left unused, the compiler puts the
+        // others together word by word instead of row by row.
+        let (xx, xy) = (xx.with_words(zero), xy.with_words(zero_too));
+        self.0 = [xx, yy, zz, xy, xz, yz].map(F32x16::to_array);
+    }
+
+    /// The inverse inertias, in a form about axes.
+    #[inline(always)]
+    pub(crate) fn of<A: Arithmetic, F: Form>(&self, arithmetic: A) -> F::Side<A> {
+        F::about_axes(self.0.each_ref().map(|words| arithmetic.load(words)))
+    }
+}
 
 /// A form of inertia that the batch computes with.
 pub(crate) trait Form: Inertia {
@@ -20,11 +52,8 @@ pub(crate) trait Form: Inertia {
     /// From the numbers beside the angular velocities; only in a form without rows.
     fn isotropic<A: Arithmetic>(k: Numbers<A>) -> Self::Side<A>;
 
-    /// From the words of the rows: xx, yy, zz, then xy, xz, yz; only in a form with rows.
-    fn about_axes<A: Arithmetic>(
-        diagonal: [Numbers<A>; 4],
-        others: [Numbers<A>; 4],
-    ) -> Self::Side<A>;
+    /// From the words xx, yy, zz, xy, xz, yz; only in a form with rows.
+    fn about_axes<A: Arithmetic>(words: [Numbers<A>; WORDS]) -> Self::Side<A>;
 
     /// The inverse inertia of one body, by the number beside its angular velocity and by its row.
     fn stored(k: f32, row: impl FnOnce() -> [Quad; 2]) -> Stored;
@@ -47,7 +76,7 @@ impl Form for Isotropic {
     }
 
     #[inline(always)]
-    fn about_axes<A: Arithmetic>([k, ..]: [Numbers<A>; 4], _: [Numbers<A>; 4]) -> Numbers<A> {
+    fn about_axes<A: Arithmetic>([k, ..]: [Numbers<A>; WORDS]) -> Numbers<A> {
         k
     }
 
@@ -68,13 +97,7 @@ impl Form for World {
     }
 
     #[inline(always)]
-    fn about_axes<A: Arithmetic>(
-        [xx, yy, zz, zero]: [Numbers<A>; 4],
-        [xy, xz, yz, zero_too]: [Numbers<A>; 4],
-    ) -> Columns<A> {
-        // Whole numbers of 0 change nothing; but where the last column is left unused, the compiler puts the
-        // others together word by word instead of row by row.
-        let (xx, xy) = (xx.with_words(zero), xy.with_words(zero_too));
+    fn about_axes<A: Arithmetic>([xx, yy, zz, xy, xz, yz]: [Numbers<A>; WORDS]) -> Columns<A> {
         Columns([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     }
 

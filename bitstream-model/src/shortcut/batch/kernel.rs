@@ -8,7 +8,7 @@
 
 use super::block::{Block, Words, kind};
 use super::given::Given;
-use super::inertia::{Form, Times};
+use super::inertia::{Form, SideInertias, Times};
 use super::numbers::{Arithmetic, Numbers};
 use super::plan::Stage;
 use super::vector::{Vector, add, cross, dot, either, neg, sub, times};
@@ -134,6 +134,8 @@ pub(crate) struct Pass<'a> {
     pub(crate) stage: Stage,
     /// Friction: whether this pass finds which spins are damped.
     pub(crate) finds: bool,
+    /// With world inertia: whether this pass gathers the inverse inertias, for itself and for later ones.
+    pub(crate) gathers: bool,
     pub(crate) parameters: &'a SolverParameters,
     /// The row written in place of a static body's.
     pub(crate) spare: u32,
@@ -172,31 +174,36 @@ unsafe fn gathered(
     [instructions.columns(first), instructions.columns(second)]
 }
 
-/// Reads the bodies of one side.
+/// Reads the bodies of one side. In a form about axes `kept` has their inverse inertias, or receives them
+/// if `gathers` is set.
 ///
 /// # Safety
 ///
-/// Each of `indices` is below the number of rows at `rows.bodies`, and in a form about axes below the number
-/// at `rows.inertias`. No other thread writes these rows during the call.
+/// Each of `indices` is below the number of rows at `rows.bodies`, and if `kept` receives the inverse inertias
+/// below the number at `rows.inertias`. No other thread writes these rows during the call.
 #[inline(always)]
 unsafe fn side<A: Arithmetic, F: Form>(
     arithmetic: A,
     instructions: impl Instructions,
     rows: Rows,
     indices: &Words<u32>,
+    (kept, gathers): (Option<&mut SideInertias>, bool),
 ) -> Side<A, F::Side<A>> {
     let of = |columns: [F32x16; 4]| columns.map(|numbers| arithmetic.of(numbers));
     // SAFETY: the caller promises that `rows.bodies` has a row for each index, and that no other thread
     // writes it.
     let [linear, angular] = unsafe { gathered(instructions, rows.bodies, indices) };
     let ([x, y, z, m], [p, q, r, beside]) = (of(linear), of(angular));
-    let k = if F::ABOUT_AXES {
-        // SAFETY: the form is about axes: the caller promises that `rows.inertias` has a row for each index,
-        // and that no other thread writes it.
-        let [diagonal, others] = unsafe { gathered(instructions, rows.inertias, indices) };
-        F::about_axes(of(diagonal), of(others))
-    } else {
-        F::isotropic(beside)
+    let k = match kept {
+        Some(kept) if F::ABOUT_AXES => {
+            if gathers {
+                // SAFETY: the caller promises that `rows.inertias` has a row for each index, and that no
+                // other thread writes it.
+                kept.put(unsafe { gathered(instructions, rows.inertias, indices) });
+            }
+            kept.of::<A, F>(arithmetic)
+        }
+        _ => F::isotropic(beside),
     };
     Side { v: [x, y, z], m, w: [p, q, r], beside, k }
 }
@@ -226,7 +233,8 @@ unsafe fn put_side<A: Arithmetic, K>(
 }
 
 /// One pass over the collisions of a block that is not serial. In a warm pass `given` takes the place of
-/// the impulses that the others compute.
+/// the impulses that the others compute. In a form about axes `kept` has the inverse inertias of both sides,
+/// or receives them if the pass gathers.
 ///
 /// # Safety
 ///
@@ -240,17 +248,26 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     pass: &Pass<'_>,
     block: &mut Block,
     given: Option<&Given>,
+    kept: Option<&mut [SideInertias; 2]>,
     rows: Rows,
 ) {
+    let [kept_a, kept_b] = match kept {
+        Some([a, b]) => [Some(a), Some(b)],
+        None => [None, None],
+    };
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = arithmetic.of(counts);
     // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
     // other thread writes them.
-    let mut a = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[0]) };
+    let mut a = unsafe {
+        side::<A, F>(arithmetic, instructions, rows, &block.rows[0], (kept_a, pass.gathers))
+    };
     // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
     // other thread writes them.
-    let mut b = unsafe { side::<A, F>(arithmetic, instructions, rows, &block.rows[1]) };
+    let mut b = unsafe {
+        side::<A, F>(arithmetic, instructions, rows, &block.rows[1], (kept_b, pass.gathers))
+    };
     if pass.stage.contact {
         contact(arithmetic, pass, block, given, counts, &mut a, &mut b);
     } else {

@@ -48,6 +48,7 @@ use block::{Block, LANES, ROWS_APART};
 use decode::{Group, PUT_OFF};
 use given::Given;
 use grouping::Places;
+use inertia::SideInertias;
 use kernel::InertiaRow;
 use line::Line;
 use plan::Stage;
@@ -89,6 +90,10 @@ pub(crate) struct Batch {
     lines: Vec<Line>,
     /// With world inertia a row for each row of the lines.
     inertias: Vec<InertiaRow>,
+    /// With world inertia the inverse inertias of both sides of each block, from the first pass on.
+    kept: Vec<[SideInertias; 2]>,
+    /// Whether a pass of this step has gathered them.
+    gathered: bool,
     /// Whether the lines have the velocities of all bodies.
     entered: bool,
     /// In a step with a warm start the impulses that came in, for each block.
@@ -125,6 +130,8 @@ impl Batch {
             bodies: 0,
             lines: Vec::new(),
             inertias: Vec::new(),
+            kept: Vec::new(),
+            gathered: false,
             entered: false,
             given: Vec::new(),
             put_off: Vec::with_capacity(PUT_OFF),
@@ -157,6 +164,7 @@ impl Batch {
         self.impulse_sum = 0;
         self.measured = false;
         self.spins = false;
+        self.gathered = false;
         self.bodies = 0;
         self.entered = false;
     }
@@ -282,12 +290,19 @@ impl Batch {
         };
         let given = &self.given[..];
         let numbers = &passes;
-        let run = Passes { numbers, plan, finding, given, width, precision, inertia };
-        let blocks = &mut self.blocks[..self.places.blocks()];
+        let gathers = !self.gathered;
+        let run = Passes { numbers, plan, finding, given, gathers, width, precision, inertia };
+        let count = self.places.blocks();
+        let world = if inertia == Inertia::World { count } else { 0 };
+        if self.kept.len() < world {
+            self.kept.resize(world, [SideInertias::ZERO; 2]);
+        }
+        let blocks = (&mut self.blocks[..count], &mut self.kept[..world]);
         let (lines, inertias) = (&mut self.lines, &self.inertias);
         let sum = self.fronts.run(run, blocks, lines, inertias, &mut self.crew);
         self.impulse_sum = self.impulse_sum.saturating_add(sum);
         self.spins |= finding.is_some();
+        self.gathered = true;
     }
 
     /// Stores the entered velocities as the passes have left them.

@@ -93,12 +93,6 @@ impl<A: Arithmetic> Numbers<A> {
         self.0
     }
 
-    /// The sums of the words as whole numbers.
-    #[inline(always)]
-    pub(crate) fn with_words(self, other: Self) -> Self {
-        Self(self.0.with_words(other.0), self.1)
-    }
-
     #[inline(always)]
     pub(crate) fn store(self, words: &mut Words) {
         *words = self.0.to_array();

@@ -23,7 +23,7 @@ use pgs_support::lanes::{Instructions, Work, prefetch};
 use super::block::{Block, LANES, kind};
 use super::given::Given;
 use super::grouping::Places;
-use super::inertia::Form;
+use super::inertia::{Form, SideInertias};
 use super::kernel::{self, InertiaRow, Pass, Rows};
 use super::line::Line;
 use super::numbers::Computed;
@@ -72,6 +72,8 @@ pub(crate) struct Passes<'a> {
     pub(crate) finding: Option<u32>,
     /// In a step with a warm start the impulses that came in, for each block.
     pub(crate) given: &'a [Given],
+    /// With world inertia: whether the first pass gathers the inverse inertias, because none has in this step.
+    pub(crate) gathers: bool,
     pub(crate) width: Width,
     /// Precision of the arithmetic.
     pub(crate) precision: Precision,
@@ -92,11 +94,12 @@ impl Fronts {
     }
 
     /// Runs passes over all blocks; returns the impulses that the last contact pass counts. The rows
-    /// of the blocks are in `lines`; with world inertia each has one in `inertias` too.
+    /// of the blocks are in `lines`; with world inertia each has one in `inertias` too, and `kept` has the
+    /// inverse inertias of each block.
     pub(crate) fn run(
         &mut self,
         passes: Passes<'_>,
-        blocks: &mut [Block],
+        (blocks, kept): (&mut [Block], &mut [[SideInertias; 2]]),
         lines: &mut [Line],
         inertias: &[InertiaRow],
         crew: &mut Crew,
@@ -111,6 +114,7 @@ impl Fronts {
         let field = Field {
             passes,
             blocks: blocks.as_mut_ptr(),
+            kept: (kept.len() == blocks.len()).then_some(kept.as_mut_ptr()),
             order: &self.order.blocks,
             rows: Rows { bodies: lines.as_mut_ptr().cast(), inertias: inertias.as_ptr() },
             needs: &self.needs,
@@ -129,12 +133,14 @@ impl Fronts {
 struct Field<'a> {
     passes: Passes<'a>,
     blocks: *mut Block,
+    /// With world inertia the inverse inertias of each block.
+    kept: Option<*mut [SideInertias; 2]>,
     /// All blocks, each once.
     order: &'a [u32],
     rows: Rows,
     needs: &'a [u32],
     progress: &'a [Progress],
-    /// The next pass that no thread has taken.
+    /// The next bundle of passes that no thread has taken.
     next: AtomicUsize,
     sum: AtomicU64,
     /// A thread has panicked: its fronts stand still.
@@ -198,14 +204,15 @@ impl Field<'_> {
     /// The next passes that no thread has.
     fn next_bundle(&self) -> Range<usize> {
         let count = self.progress.len();
-        if self.next.load(Ordering::Relaxed) >= count {
-            return 0..0;
+        // As few bundles as possible; two threads take one each. The first of two lengths is the shorter one:
+        // its thread is the one that waits for the memory.
+        let bundles = count.div_ceil(BUNDLE_MAX).max(if self.alone { 1 } else { 2 });
+        let begin = |bundle: usize| bundle.min(bundles) * count / bundles;
+        if self.next.load(Ordering::Relaxed) >= bundles {
+            return count..count;
         }
-        // As few bundles as possible, of about the same length; two threads take one each.
-        let least = if self.alone { 1 } else { 2 };
-        let bundle = count.div_ceil(count.div_ceil(BUNDLE_MAX).max(least));
-        let first = self.next.fetch_add(bundle, Ordering::Relaxed).min(count);
-        first..(first + bundle).min(count)
+        let bundle = self.next.fetch_add(1, Ordering::Relaxed);
+        begin(bundle)..begin(bundle + 1)
     }
 
     /// Whether a pass has come to its end.
@@ -271,6 +278,7 @@ impl Field<'_> {
         let pass = Pass {
             stage,
             finds: self.passes.finding == Some(number),
+            gathers: self.passes.gathers && pass == 0,
             parameters: self.passes.plan.parameters,
             spare: 2 * (register(thread) + 1),
         };
@@ -295,9 +303,13 @@ impl Field<'_> {
     /// The same in a format, with a form of inertia, in a warm pass or another one.
     fn chunk_in<F: Computed, I: Form, const WARM: bool>(&self, pass: Pass<'_>, chunk: usize) {
         let mut sum = 0;
-        let blocks = &self.order[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.order.len())];
+        let (behind, end) = (((chunk + 1) * CHUNK).min(self.order.len()), self.order.len());
+        let blocks = &self.order[chunk * CHUNK..behind];
+        let ahead = &self.order[(chunk * CHUNK + 1)..(behind + 1).min(end)];
         let format = PhantomData::<(F, I)>;
-        let work = ChunkWork::<F, I, WARM> { field: self, pass, blocks, sum: &mut sum, format };
+        let sum_of = &mut sum;
+        let work =
+            ChunkWork::<F, I, WARM> { field: self, pass, blocks, ahead, sum: sum_of, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
         }
@@ -313,6 +325,8 @@ struct ChunkWork<'a, F, I, const WARM: bool> {
     field: &'a Field<'a>,
     pass: Pass<'a>,
     blocks: &'a [u32],
+    /// The block behind each, which may be of the next chunk.
+    ahead: &'a [u32],
     sum: &'a mut u64,
     format: PhantomData<(F, I)>,
 }
@@ -323,10 +337,13 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
     #[inline(always)]
     fn run(self, instructions: impl Instructions) {
         for (at, &index) in self.blocks.iter().enumerate() {
-            if let Some(&ahead) = self.blocks.get(at + 1) {
+            if let Some(&ahead) = self.ahead.get(at) {
                 prefetch(self.field.blocks.wrapping_add(ahead as usize));
                 if let Some(given) = self.field.given::<WARM>(ahead) {
                     prefetch(given);
+                }
+                if let Some(kept) = self.field.kept {
+                    prefetch(kept.wrapping_add(ahead as usize));
                 }
             }
             // SAFETY: `order` has numbers of blocks.
@@ -347,7 +364,16 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
             // `Sync`.
             unsafe {
                 let rows = self.field.rows;
-                kernel::solve::<_, I>(arithmetic, instructions, &self.pass, block, given, rows);
+                let kept = self.field.kept.map(|kept| &mut *kept.add(index as usize));
+                kernel::solve::<_, I>(
+                    arithmetic,
+                    instructions,
+                    &self.pass,
+                    block,
+                    given,
+                    kept,
+                    rows,
+                );
             }
             if self.pass.stage.contact && self.pass.stage.turning {
                 *self.sum = self.sum.saturating_add(counted::<F>(block));
