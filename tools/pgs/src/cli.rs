@@ -187,7 +187,7 @@ mod tests {
             "pgs --json run --steps 5",
         ] {
             let command = parsed(line).expect(line);
-            assert!(matches!(command.verb, Verb::Run(RunArgs { steps: 5, .. })), "{line}");
+            assert!(matches!(command.verb, Verb::Run(RunArgs { steps: Some(5), .. })), "{line}");
         }
         assert!(matches!(parsed("pgs").expect("no verb").verb, Verb::Run(_)));
     }

@@ -186,8 +186,16 @@ pub(crate) fn not_built(error: ConfigError) -> Failure {
 
 /// Opens a board.
 pub(crate) fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard, Failure> {
-    let ChosenBoard { options, observer, reason, .. } =
-        find(common, build.config(), board_option(build))?;
+    open_as(common, build, build.config())
+}
+
+/// As [`open`], with an emulated board of this configuration: the build, and what a scene needs beside it.
+pub(crate) fn open_as(
+    common: &CommonArgs,
+    build: &Build,
+    config: BoardConfig,
+) -> Result<OpenBoard, Failure> {
+    let ChosenBoard { options, observer, reason, .. } = find(common, config, board_option(build))?;
     let accelerator = Accelerator::open(options)
         .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
     Ok(OpenBoard { accelerator, observer, injected: None, reason })

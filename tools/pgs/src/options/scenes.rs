@@ -1,5 +1,7 @@
 //! The scene, as chosen on the command line.
 
+use bitstream_model::BoardConfig;
+use bitstream_model::interface::profile::Inertia as Form;
 use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
@@ -19,12 +21,12 @@ const DROP: f32 = 1.0;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
     /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
-    /// of several masses), for which the board needs --inertia world.
+    /// of several masses), for which an emulated board has world inertia.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
-    /// Bodies along each axis; y is up.
-    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
-    grid: Grid,
+    /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]
+    #[arg(long, value_name = "NXxNYxNZ")]
+    grid: Option<Grid>,
     /// Height of the lowest bodies above the ground at the start, m.
     #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
     drop: f32,
@@ -68,7 +70,7 @@ fn drop_height(text: &str) -> Result<f32, String> {
 impl SceneArgs {
     /// Builds the scene. Detection uses as many threads as the emulated board may.
     pub(crate) fn build(&self, board: &Build) -> Result<Scene, Failure> {
-        let Self { grid, drop, .. } = *self;
+        let (grid, drop) = (self.grid(), self.drop);
         let built = match self.scene {
             SceneName::Cubes if self.seed.is_some() => {
                 let error = "--seed is for --scene shapes, the cubes are not placed at random";
@@ -86,6 +88,18 @@ impl SceneArgs {
         Ok(scene)
     }
 
+    fn grid(&self) -> Grid {
+        let shapes = || Grid::new(10, 10, 10).unwrap_or_default();
+        self.grid.unwrap_or_else(|| if self.is_cubes() { Grid::default() } else { shapes() })
+    }
+
+    /// The configuration of an emulated board of that build, with the inertia that the shapes need unless the
+    /// build names another.
+    pub(crate) fn config(&self, build: &Build) -> BoardConfig {
+        let inertia = (!self.is_cubes()).then_some(Form::World);
+        Build { inertia: build.inertia.or(inertia), ..*build }.config()
+    }
+
     fn inertia(&self) -> Inertia {
         self.cube_inertia.map_or(Inertia::default(), Into::into)
     }
@@ -97,13 +111,14 @@ impl SceneArgs {
     /// Refuses a grid that does not fit, before memory is allocated for it.
     pub(crate) fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
         let capacity = capabilities.body_capacity;
-        if self.grid.cubes() < capacity {
+        let grid = self.grid();
+        if grid.cubes() < capacity {
             return Ok(());
         }
         let error = format!(
             "a grid of {} is {} bodies with the ground, the board takes at most {capacity}",
-            self.grid,
-            u64::from(self.grid.cubes()) + 1
+            grid,
+            u64::from(grid.cubes()) + 1
         );
         Err(Failure::input(error).next("give a smaller --grid"))
     }
@@ -125,7 +140,7 @@ impl SceneArgs {
 
     /// The scene for people.
     pub(crate) fn text(&self) -> String {
-        let Self { grid, drop, .. } = self;
+        let (grid, drop) = (self.grid(), self.drop);
         let what = match self.scene {
             SceneName::Cubes => format!("cubes ({grid})"),
             SceneName::Shapes => {
@@ -141,7 +156,7 @@ impl SceneArgs {
         let cubes = self.is_cubes();
         json!({
             "scene": if cubes { "cubes" } else { "shapes" },
-            "grid": self.grid.to_string(),
+            "grid": self.grid().to_string(),
             "drop_m": self.drop,
             "inertia": match self.inertia() {
                 _ if !cubes => None,

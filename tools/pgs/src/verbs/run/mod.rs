@@ -1,5 +1,6 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
+mod beside;
 mod row;
 mod summary;
 
@@ -8,8 +9,9 @@ use std::io::{self, Write};
 use clap::Args;
 use scene::Scene;
 use serde_json::{Value, json};
-use zynq_pgs::{BoardKind, ContactMemory, StepParameters, StepReport};
+use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepReport};
 
+use self::beside::{Beside, Cold};
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
 use crate::board::{self, OpenBoard};
@@ -29,7 +31,7 @@ use crate::output::SCHEMA;
 use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
-use crate::output::table::{heading, line};
+use crate::output::table::{Column, heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -41,7 +43,8 @@ Examples:
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
-  pgs run --scene shapes --inertia world --pair-friction --warm-start --grid 8x8x8 --steps 600
+  pgs run --scene shapes                         shapes of several masses, warm beside cold
+  pgs run --scene shapes --warm-start=false --pair-friction=false     the same on a board of 1.1
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
@@ -54,10 +57,13 @@ thesis names no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile
 
 Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
-step on the board, modelled for an emulated board; time of this machine.";
+step on the board, modelled for an emulated board; time of this machine. With --beside-cold the depth
+and the energy of the same scene without a warm start and with one friction, stepped beside it.";
 
 /// Default rows of the table.
 const ROWS: u32 = 15;
+/// Default steps of the cubes, and of the shapes.
+const STEPS: [u32; 2] = [120, 600];
 /// Default contact and friction iterations of a step: enough to carry 30 layers.
 const ITERATIONS: u32 = 10;
 
@@ -65,9 +71,9 @@ const ITERATIONS: u32 = 10;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct RunArgs {
-    /// Steps to take.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) steps: u32,
+    /// Steps to take [default: 120 of the cubes, 600 of the shapes]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: Option<u32>,
     #[command(flatten)]
     scene: SceneArgs,
     /// Show every N-th step [default: a fifteenth of the steps]
@@ -79,11 +85,17 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     solver: SolverArgs,
     /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
-    #[arg(long, help_heading = "Solver")]
-    warm_start: bool,
-    /// Give each pair of shapes a friction of its own, from both bodies' kinds (--scene shapes)
-    #[arg(long, help_heading = "Solver")]
-    pair_friction: bool,
+    /// [default: of the shapes, if the board can]
+    #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    warm_start: Option<bool>,
+    /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: of the
+    /// shapes, if the board can]
+    #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pair_friction: Option<bool>,
+    /// Step the same scene beside this one without a warm start and with one friction, and show how
+    /// deep its bodies sink and how much they move [default: of the shapes with a warm start]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    beside_cold: Option<bool>,
     #[command(flatten)]
     ordering: OrderingArgs,
     #[command(flatten)]
@@ -97,21 +109,39 @@ pub(crate) struct RunArgs {
 }
 
 impl RunArgs {
-    fn parameters(&self) -> StepParameters {
+    /// The parameters of a step. The shapes ask for all that a board can; a choice of the user's is taken
+    /// as it is.
+    fn parameters(&self, can: &Capabilities) -> StepParameters {
+        let shapes = !self.scene.is_cubes();
+        let warm = self.warm_start.unwrap_or(shapes && can.extensions.warm_start);
+        let frictions = self.pair_friction.unwrap_or(shapes && can.extensions.pair_friction);
         let parameters = StepParameters::default()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
-            .with_warm_start(self.warm_start)
-            .with_impulses_out(self.warm_start)
-            .with_pair_friction(self.pair_friction);
+            .with_warm_start(warm)
+            .with_impulses_out(warm)
+            .with_pair_friction(frictions);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
 
     /// Whether the table shows this step.
     fn is_shown(&self, step: u32) -> bool {
-        let every = self.report_every.unwrap_or(self.steps.div_ceil(ROWS));
-        step == 1 || step.is_multiple_of(every) || step == self.steps
+        let every = self.report_every.unwrap_or(self.steps().div_ceil(ROWS));
+        step == 1 || step.is_multiple_of(every) || step == self.steps()
+    }
+
+    fn steps(&self) -> u32 {
+        let [cubes, shapes] = STEPS;
+        self.steps.unwrap_or(if self.scene.is_cubes() { cubes } else { shapes })
+    }
+
+    /// The scene that is stepped beside this one, if one is.
+    fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
+        let shapes = !self.scene.is_cubes();
+        let wanted = self.beside_cold.unwrap_or(shapes && parameters.warm_start);
+        let scene = || self.scene.build(&self.build.build());
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
     }
 }
 
@@ -126,6 +156,8 @@ struct Course {
     /// With `--json`, the document of every step.
     documents: Vec<Value>,
     last: Option<Row>,
+    /// The scene beside it.
+    cold: Option<Cold>,
 }
 
 /// Steps the scene.
@@ -134,25 +166,28 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let mut opened = board::open(common, &args.build.build())?;
+    let build = args.build.build();
+    let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
-    let mut scene = args.scene.build(&args.build.build())?;
-    if args.pair_friction {
+    let parameters = args.parameters(opened.accelerator.capabilities());
+    let mut scene = args.scene.build(&build)?;
+    if parameters.pair_friction {
         args.scene.give_frictions(&mut scene)?;
     }
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
-    let parameters = args.parameters();
+    let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
 
-    let course = take_steps(args, common, &parameters, &mut opened, &mut scene, &interrupt, out)?;
-    let complete = course.done == args.steps;
+    let scenes = (&mut scene, &mut course);
+    take_steps(args, common, &parameters, &mut opened, scenes, &interrupt, out)?;
+    let complete = course.done == args.steps();
     if common.json {
         let document = document(args, &parameters, &opened, &mut scene, course, complete);
         writeln!(out, "{document:#}")?;
     } else {
-        print_end(args, &parameters, &opened, &mut scene, &course, out)?;
+        print_end(args, &parameters, &opened, &mut scene, &mut course, out)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
@@ -163,20 +198,29 @@ fn take_steps(
     common: &CommonArgs,
     parameters: &StepParameters,
     opened: &mut OpenBoard,
-    scene: &mut Scene,
+    (scene, course): (&mut Scene, &mut Course),
     interrupt: &Interrupt,
     out: &mut dyn Write,
-) -> Result<Course, Failure> {
-    let progress = progress_bar(args.steps);
+) -> Result<(), Failure> {
+    let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
-    let mut course = Course::default();
-    let mut memory = args.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
-    while course.done < args.steps && !interrupt.is_set() {
+    let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
+    while course.done < args.steps() && !interrupt.is_set() {
         let row =
             step(course.done + 1, parameters, &mut opened.accelerator, scene, memory.as_mut())
                 .map_err(|error| args.faults.failure(opened, parameters, error))?;
         opened.alive()?;
         let Some(row) = row else { break };
+        let mut beside = None;
+        if let Some(cold) = &mut course.cold {
+            beside = cold
+                .step(course.done + 1, &mut opened.accelerator)
+                .map_err(|error| args.faults.failure(opened, parameters, error))?;
+            opened.alive()?;
+            if beside.is_none() {
+                break;
+            }
+        }
         course.done += 1;
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
@@ -184,22 +228,40 @@ fn take_steps(
         course.orders.count(row.report.order);
         if course.done == 1 && !common.json {
             // The heading waits for the first step: a refused scene prints only the refusal.
-            progress.suspend(|| print_heading(args, opened, &row.report, out))?;
+            let cold = course.cold.is_some();
+            progress.suspend(|| print_heading(args, opened, (&row.report, cold), out))?;
         }
         progress.inc(1);
         if common.json {
-            course.documents.push(row.to_json());
+            let mut document = row.to_json();
+            if let Some(beside) = &beside {
+                document["beside_cold"] = beside.to_json();
+            }
+            course.documents.push(document);
         } else if args.is_shown(course.done) {
             progress.suspend(|| match args.wide {
                 true => line(out, &ALL_COLUMNS, row.all_cells()),
-                false => line(out, &columns(is_emulated(opened)), row.cells()),
+                false => {
+                    let cells = beside.map(Beside::cells).into_iter().flatten();
+                    line(
+                        out,
+                        &all_columns(opened, beside.is_some()),
+                        row.cells().into_iter().chain(cells),
+                    )
+                }
             })?;
             out.flush()?;
         }
         course.last = Some(row);
     }
     progress.finish_and_clear();
-    Ok(course)
+    Ok(())
+}
+
+/// The columns of the default table.
+fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Column> {
+    let own = columns(is_emulated(opened));
+    own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold)).collect()
 }
 
 /// Whether the times of the board are modelled.
@@ -211,7 +273,7 @@ fn is_emulated(opened: &OpenBoard) -> bool {
 fn print_heading(
     args: &RunArgs,
     opened: &OpenBoard,
-    first: &StepReport,
+    (first, beside_cold): (&StepReport, bool),
     out: &mut dyn Write,
 ) -> io::Result<()> {
     opened.print(out)?;
@@ -220,7 +282,7 @@ fn print_heading(
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
-        false => heading(out, &columns(is_emulated(opened)))?,
+        false => heading(out, &all_columns(opened, beside_cold))?,
     }
     out.flush()
 }
@@ -248,13 +310,14 @@ fn print_end(
     parameters: &StepParameters,
     opened: &OpenBoard,
     scene: &mut Scene,
-    course: &Course,
+    course: &mut Course,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     writeln!(out)?;
-    let Course { done, retries, orders, footprint, .. } = course;
-    if *done != args.steps {
-        writeln!(out, "interrupted after {done} of {} steps", args.steps)?;
+    let cold = course.cold.as_mut().and_then(Cold::end_text);
+    let Course { done, retries, orders, footprint, .. } = &*course;
+    if *done != args.steps() {
+        writeln!(out, "interrupted after {done} of {} steps", args.steps())?;
     }
     if let Some(faults) = opened.faults_text() {
         writeln!(out, "{faults}")?;
@@ -264,6 +327,9 @@ fn print_end(
     }
     if let Some(summary) = summary(args, parameters, opened, scene, course) {
         summary.print(out)?;
+    }
+    if let Some(cold) = cold {
+        fact(out, "cold", &cold)?;
     }
     if let Some(orders) = orders.text() {
         fact(out, "orders", &orders)?;
@@ -283,7 +349,7 @@ fn document(
     complete: bool,
 ) -> Value {
     let mut config = args.scene.to_json();
-    config["steps"] = args.steps.into();
+    config["steps"] = args.steps().into();
     config["contact_iterations"] = parameters.contact_iterations.into();
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
@@ -292,6 +358,7 @@ fn document(
     config["pair_friction"] = parameters.pair_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
+    let cold = course.cold.as_mut().and_then(Cold::end_json);
     let summary = summary(args, parameters, opened, scene, &course);
     let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
     json!({
@@ -302,6 +369,7 @@ fn document(
         "complete": complete,
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
+        "beside_cold": cold,
         "faults": opened.faults_json(),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },

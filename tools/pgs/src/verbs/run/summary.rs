@@ -146,7 +146,7 @@ impl Thesis {
 
 /// The state of the pile at the end.
 #[derive(Debug, Clone, Copy)]
-struct FinalState {
+pub(super) struct FinalState {
     /// Kinetic energy without gravity's last addition, J.
     kinetic_energy: f64,
     /// The common speed of all bodies at this energy, m/s.
@@ -156,7 +156,7 @@ struct FinalState {
 }
 
 impl FinalState {
-    fn of(scene: &mut Scene, last: &Row) -> Self {
+    pub(super) fn of(scene: &mut Scene, last: &Row) -> Self {
         scene.detect();
         let deepest = penetration(scene.collisions()).largest;
         let mass = moving_mass(scene.bodies(), scene.shapes());
@@ -169,7 +169,7 @@ impl FinalState {
         self.speed <= REST
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         format!(
             "{}: {:.1} cm/s on average ({:.3} kJ), deepest penetration {:.1} mm",
             if self.is_at_rest() { "at rest" } else { "not at rest" },
@@ -177,6 +177,17 @@ impl FinalState {
             self.kinetic_energy / 1e3,
             self.deepest * 1e3,
         )
+    }
+}
+
+impl FinalState {
+    pub(super) fn to_json(self) -> Value {
+        json!({
+            "at_rest": self.is_at_rest(),
+            "kinetic_energy_before_gravity_j": self.kinetic_energy,
+            "speed_m_s": self.speed,
+            "deepest_penetration_m": self.deepest,
+        })
     }
 }
 
@@ -329,12 +340,7 @@ impl<'a> Summary<'a> {
             })),
             "bytes_to_device": totals.bytes_to_device,
             "bytes_from_device": totals.bytes_from_device,
-            "end": {
-                "at_rest": end.is_at_rest(),
-                "kinetic_energy_before_gravity_j": end.kinetic_energy,
-                "speed_m_s": end.speed,
-                "deepest_penetration_m": end.deepest,
-            },
+            "end": end.to_json(),
         })
     }
 }
