@@ -50,7 +50,7 @@ impl CollisionPacker {
         }
         let mut channels = self.channels.each_mut().map(Vec::as_mut_slice);
         let channels = &mut channels[..streams];
-        let target = Target { variant: &self.variant, shapes, quick: None };
+        let target = Target { variant: &self.variant, shapes, streamed_masses: false, quick: None };
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
         let entries = Entries { collisions, count, added: None, words: None };
@@ -91,7 +91,11 @@ impl StepPacker {
     /// Writes the records of all bodies, unchecked; returns the sum of their words, modulo 2^32.
     pub fn pack_bodies<B: Bodies + ?Sized>(&mut self, bodies: &B, shapes: &[Shape]) -> u32 {
         let variant = self.limits.variant;
-        self.bodies(bodies, Target { variant: &variant, shapes, quick: None }).0
+        self.bodies(
+            bodies,
+            Target { variant: &variant, shapes, streamed_masses: false, quick: None },
+        )
+        .0
     }
 
     /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
@@ -104,7 +108,7 @@ impl StepPacker {
         added: Option<usize>,
     ) -> Option<u32> {
         let variant = self.limits.variant;
-        let target = Target { variant: &variant, shapes, quick: None };
+        let target = Target { variant: &variant, shapes, streamed_masses: false, quick: None };
         let (sum, good) = self.entries(collisions, added, target);
         good.then_some(sum)
     }
@@ -124,7 +128,12 @@ impl StepPacker {
         let limits = self.limits;
         let scene = preflight(bodies, collisions, shapes, &StepParameters::default(), &limits)?;
         let quick = Quick::new(scene);
-        let target = Target { variant: &limits.variant, shapes, quick: Some(&quick) };
+        let target = Target {
+            variant: &limits.variant,
+            shapes,
+            streamed_masses: false,
+            quick: Some(&quick),
+        };
         let (of_bodies, bodies_good) = self.bodies(bodies, target);
         let (of_collisions, good) = self.entries(collisions, added, target);
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
@@ -135,7 +144,7 @@ impl StepPacker {
     /// collisions that are not stored as structures.
     pub fn deal_bare<C: Collisions + ?Sized>(&mut self, collisions: &C) -> usize {
         let variant = self.limits.variant;
-        let target = Target { variant: &variant, shapes: &[], quick: None };
+        let target = Target { variant: &variant, shapes: &[], streamed_masses: false, quick: None };
         let count = collisions.len();
         let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
         bare::deal(&variant, collisions, &mut channels[..variant.profile.mm2s_widths.len()])
@@ -214,7 +223,7 @@ impl Unpacker {
             channel.resize(layout.beats_on_channel(bodies.len(), place), one);
         }
         let (mut ends, mut statics) = (Table::default(), Vec::new());
-        let target = Target { variant: &variant, shapes, quick: None };
+        let target = Target { variant: &variant, shapes, streamed_masses: false, quick: None };
         let into = Survey { ends: &mut ends, statics: &mut statics };
         survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
         Self { variant, channels, statics, spare: Vec::new(), packers: PackPool::new(threads) }

@@ -269,7 +269,7 @@ impl Device {
         self.control.set_arguments(
             count(plan.bodies),
             count(plan.collisions),
-            parameters,
+            (parameters, plan.streamed_masses),
             extensions,
         );
         // Buffers and descriptors must be visible before the first doorbell.

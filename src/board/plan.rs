@@ -39,6 +39,8 @@ pub(crate) struct Plan {
     pub(crate) passes: Passes,
     /// Profile and formats: they decide how records lie on the channels.
     pub(crate) variant: Variant,
+    /// Whether the velocity records bring the inverse masses, because the shapes do not fit the table.
+    pub(crate) streamed_masses: bool,
 }
 
 /// Where the segments lie in the buffer of one MM2S channel, beats.
@@ -205,6 +207,7 @@ mod tests {
         collisions: 127_746,
         passes: PASSES,
         variant: FLOAT.default_variant(),
+        streamed_masses: false,
     };
     const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
@@ -305,7 +308,7 @@ mod tests {
         let bytes = |collisions| {
             let variant = HALF.default_variant();
             let passes = Passes { contact: 1, ..Passes::default() };
-            let plan = Plan { bodies: 5, collisions, passes, variant };
+            let plan = Plan { collisions, passes, variant, bodies: 5, ..FOUR };
             plan.bytes_to_device()
         };
         assert_eq!(bytes(3), bytes(4));

@@ -7,6 +7,7 @@ use super::plan::Plan;
 use super::root_cause::other_bitstream;
 use super::symptom::Symptom;
 use crate::axi_dma::DmaError;
+use crate::control_block::Capabilities;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
 use crate::scene::Shape;
@@ -112,7 +113,8 @@ impl Device {
             return Err(other_bitstream(changed));
         }
         self.was_reset();
-        self.control.load_shapes(shapes, self.capabilities.variant.inertia);
+        let Capabilities { variant, shape_capacity, .. } = &self.capabilities;
+        self.control.load_shapes(shapes, variant.inertia, *shape_capacity);
         log::info!("the board was reset after a fault");
         Ok(())
     }

@@ -24,14 +24,14 @@ const ARGUMENTS: usize = 14;
 fn arguments(
     bodies: u32,
     collisions: u32,
-    parameters: &StepParameters,
+    (parameters, streamed_masses): (&StepParameters, bool),
 ) -> [(Register, u32); ARGUMENTS] {
     [
         (BODIES, bodies),
         (COLLISIONS, collisions),
         (CONTACT_ITERATIONS, parameters.contact_iterations),
         (FRICTION_ITERATIONS, parameters.friction_iterations),
-        (FLAGS, flags_of(parameters)),
+        (FLAGS, flags_of(parameters, streamed_masses)),
         (TIME_STEP, parameters.time_step.to_bits()),
         (POSITION_DRIFT, parameters.position_drift.to_bits()),
         (POSITION_COEFFICIENT, parameters.position_coefficient.to_bits()),
@@ -45,12 +45,13 @@ fn arguments(
 }
 
 /// The switches of a step.
-fn flags_of(parameters: &StepParameters) -> u32 {
+fn flags_of(parameters: &StepParameters, streamed_masses: bool) -> u32 {
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
     let word = flags::WARM_START.put(word, parameters.warm_start.into());
-    flags::IMPULSES_OUT.put(word, parameters.impulses_out.into())
+    let word = flags::IMPULSES_OUT.put(word, parameters.impulses_out.into());
+    flags::STREAMED_MASSES.put(word, streamed_masses.into())
 }
 
 /// The accelerator's control block.
@@ -78,12 +79,12 @@ impl Control {
     }
 
     /// Writes the arguments that differ from the values in the registers. A board without an
-    /// extension has no register for its argument.
+    /// extension has no register for its argument. Masses are in the shape table, or streamed.
     pub(crate) fn set_arguments(
         &mut self,
         bodies: u32,
         collisions: u32,
-        parameters: &StepParameters,
+        parameters: (&StepParameters, bool),
         extensions: Extensions,
     ) {
         for (place, (register, value)) in
@@ -139,29 +140,30 @@ mod tests {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let parameters = StepParameters::default();
-        control.set_arguments(2, 1, &parameters, Extensions::ALL);
+        control.set_arguments(2, 1, (&parameters, false), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), ARGUMENTS);
         assert_eq!(registers.with(|state| state.values[&0x38]), (1.0f32 / 60.0).to_bits());
         assert_eq!(registers.with(|state| state.values[&0x30]), 1);
-        control.set_arguments(2, 7, &parameters, Extensions::ALL);
+        control.set_arguments(2, 7, (&parameters, false), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes[ARGUMENTS..].to_vec()), [(0x18, 7)]);
     }
 
     #[test]
     fn each_switch_has_its_bit() {
-        let word = |parameters: StepParameters| flags_of(&parameters);
+        let word = |parameters: StepParameters| flags_of(&parameters, false);
         let none = StepParameters::default().with_integrate(false);
         assert_eq!(word(none), 0b000);
         assert_eq!(word(StepParameters::default()), 0b001);
         assert_eq!(word(none.with_kinematic(true)), 0b010);
         assert_eq!(word(none.with_pair_friction(true)), 0b100);
+        assert_eq!(flags_of(&none, true), 0b10_0000);
     }
 
     #[test]
     fn a_board_of_version_1_1_gets_no_argument_that_it_lacks() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(2, 1, &StepParameters::default(), Extensions::NONE);
+        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::NONE);
         assert_eq!(registers.with(|state| state.writes.len()), 13);
         assert!(registers.with(|state| state.writes.iter().all(|(offset, _)| *offset <= 0x70)));
     }
@@ -171,13 +173,13 @@ mod tests {
         let registers = FakeRegisters::default();
         registers.with(|state| state.kept_bits.insert(0x1C0, 0));
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(2, 1, &StepParameters::default(), Extensions::ALL);
+        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::ALL);
         control.reset(&FakePlatform::default()).expect("out of reset");
         assert_eq!(
             registers.with(|state| state.writes[ARGUMENTS..].to_vec()),
             [(0x1C0, 1), (0x04, 1), (0x08, 4)]
         );
-        control.set_arguments(2, 1, &StepParameters::default(), Extensions::ALL);
+        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), 2 * ARGUMENTS + 3);
     }
 

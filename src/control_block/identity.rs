@@ -70,6 +70,14 @@ pub struct Capabilities {
     pub address_width: u32,
 }
 
+impl Capabilities {
+    /// The largest number of shapes. Where each body can bring its inverse mass, the table does not limit it.
+    #[must_use]
+    pub const fn shapes_max(&self) -> u32 {
+        if self.extensions.streamed_masses { u32::MAX } else { self.shape_capacity }
+    }
+}
+
 /// Why a bitstream was refused. Nothing was written to it.
 #[derive(Debug, Error)]
 #[non_exhaustive]

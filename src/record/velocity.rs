@@ -22,19 +22,23 @@ pub(crate) fn encode(body: &Body) -> Record<{ velocity::ROWS }> {
 }
 
 /// The velocity record with world inertia: the rows of [`encode`], and the inverse inertia of the
-/// body.
+/// body, beside which its inverse mass stands; that is 0 where masses are not streamed.
 ///
-/// Shape: 4 rows. Units: m/s, rad/s, 1/(kg m²), world frame.
+/// Shape: 4 rows. Units: m/s, rad/s, 1/(kg m²), 1/kg, world frame.
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode_world(body: &Body, inertia: &Inverse) -> Record<{ velocity::WORLD_ROWS }> {
+pub(crate) fn encode_world(
+    body: &Body,
+    inertia: &Inverse,
+    inverse_mass: f32,
+) -> Record<{ velocity::WORLD_ROWS }> {
     let Record { rows: [linear, angular], integers } = encode(body);
     let mut record = Record::from([Lanes::all(0); velocity::WORLD_ROWS]);
     record.rows[velocity::LINEAR] = linear;
     record.rows[velocity::ANGULAR] = angular;
     [record.integers[velocity::LINEAR], record.integers[velocity::ANGULAR]] = integers;
-    record.rows[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, 0);
+    record.rows[velocity::DIAGONAL] = vec3_and_word(inertia.diagonal, inverse_mass.to_bits());
     record.rows[velocity::OFF_DIAGONAL] = vec3_and_word(inertia.off_diagonal, 0);
     record
 }
@@ -74,9 +78,12 @@ mod tests {
             shape: 5,
         };
         let inertia = Inverse { diagonal: [1.0, 2.0, 3.0], off_diagonal: [-0.5, 0.25, 4.0] };
-        let rows = encode_world(&body, &inertia).whole().map(Beat::from);
+        let rows = encode_world(&body, &inertia, 0.0).whole().map(Beat::from);
         assert_eq!(rows[..2], encode(&body).whole().map(Beat::from));
         assert_eq!(rows[2], Beat([0x3F80_0000, 0x4000_0000, 0x4040_0000, 0]));
         assert_eq!(rows[3], Beat([0xBF00_0000, 0x3E80_0000, 0x4080_0000, 0]));
+        let streamed = encode_world(&body, &inertia, 0.5).whole().map(Beat::from);
+        assert_eq!(streamed[2], Beat([0x3F80_0000, 0x4000_0000, 0x4040_0000, 0x3F00_0000]));
+        assert_eq!([streamed[0], streamed[1], streamed[3]], [rows[0], rows[1], rows[3]]);
     }
 }

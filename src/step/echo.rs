@@ -142,7 +142,8 @@ fn plan(bodies: usize, variant: Variant) -> Plan {
         Flow::Window(_) => (bodies.next_multiple_of(profile.collisions_per_issue as usize), 1),
     };
     let passes = Passes { contact: passes, ..Passes::default() };
-    Plan { bodies, collisions, passes, variant }
+    // The shapes of an echo fit every table.
+    Plan { bodies, collisions, passes, variant, streamed_masses: false }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

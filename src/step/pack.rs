@@ -90,7 +90,13 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
             None if order_summary.scheduled => ordering.schedule().len(),
             None => self.collisions.len(),
         };
-        Plan { bodies, collisions, passes: self.parameters.passes(), variant: self.limits.variant }
+        Plan {
+            bodies,
+            collisions,
+            passes: self.parameters.passes(),
+            variant: self.limits.variant,
+            streamed_masses: self.limits.streams_masses(self.shapes.len()),
+        }
     }
 
     /// Writes the records into the bank. Returns what the screening saw of the input.

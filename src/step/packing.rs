@@ -61,7 +61,8 @@ impl Device {
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
-        let target = Target { variant: &plan.variant, shapes, quick };
+        let target =
+            Target { variant: &plan.variant, shapes, streamed_masses: plan.streamed_masses, quick };
         let packers = &mut self.packers;
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, bodies_passed) = match lives {

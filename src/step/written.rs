@@ -113,12 +113,14 @@ impl Accelerator {
 
         let variant = limits.variant;
         let passes = parameters.passes();
-        let mut plan = Plan { bodies: bodies.len(), collisions: announced, passes, variant };
+        let streamed_masses = limits.streams_masses(shapes.len());
+        let mut plan =
+            Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 
         let quick = Quick::new(scene);
-        let target = Target { variant: &variant, shapes, quick: Some(&quick) };
+        let target = Target { variant: &variant, shapes, streamed_masses, quick: Some(&quick) };
         let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
         let (sent, written) = device.pack_written(
             &plan,

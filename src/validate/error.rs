@@ -315,7 +315,8 @@ pub enum InputError {
     /// More shapes than the table has entries.
     #[error(
         "found {found} shapes, the bitstream's table takes at most {limit}: give bodies of equal \
-         mass and inertia one shape"
+         mass and inertia one shape, or load a bitstream of world inertia with streamed masses \
+         (interface 1.2), which takes any number"
     )]
     TooManyShapes {
         /// Shapes given.

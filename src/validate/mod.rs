@@ -95,6 +95,11 @@ impl Limits {
         }
     }
 
+    /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
+    pub(crate) fn streams_masses(&self, shapes: usize) -> bool {
+        self.extensions.streamed_masses && exceeds(shapes, self.shape_capacity)
+    }
+
     /// The number of collisions that fit beside `bodies` bodies.
     pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
         let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));
@@ -275,7 +280,7 @@ pub(crate) mod tests {
     };
     pub(crate) const FLOAT: Limits = Limits {
         variant: profile::FLOAT.default_variant(),
-        extensions: Extensions::ALL,
+        extensions: Extensions::possible(&profile::FLOAT.default_variant()),
         flush_subnormals: false,
         body_capacity: 131_072,
         collision_capacity: 262_144,

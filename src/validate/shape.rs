@@ -27,7 +27,7 @@ pub(crate) fn check_shapes(
     if shapes.is_empty() {
         return Err(InputError::NoShapes);
     }
-    if exceeds(shapes.len(), limits.shape_capacity) {
+    if exceeds(shapes.len(), limits.shape_capacity) && !limits.streams_masses(shapes.len()) {
         return Err(InputError::TooManyShapes {
             found: shapes.len(),
             limit: limits.shape_capacity,
@@ -98,6 +98,7 @@ pub(crate) fn needed(shapes: &[Shape]) -> Inertia {
 mod tests {
     use super::super::tests::{FLOAT, HALF, on};
     use super::*;
+    use pgs_interface::extension::Extensions;
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
 
@@ -125,6 +126,8 @@ mod tests {
     fn more_shapes_than_entries_are_refused() {
         assert_eq!(validated(&[CUBE; 64]), Ok(()));
         assert_eq!(validated(&[CUBE; 65]), Err(InputError::TooManyShapes { found: 65, limit: 64 }));
+        let streams = Limits { extensions: Extensions::ALL, ..FLOAT };
+        assert_eq!(validate_shapes(&[CUBE; 65], &streams), Ok(()));
     }
 
     #[test]

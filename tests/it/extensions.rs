@@ -171,6 +171,71 @@ fn a_profile_without_an_extension_names_the_ones_that_have_it() {
     }
 }
 
+/// A hundred and fifty shapes, more than the table has entries: a static one, and as many masses and
+/// inertias as moving ones.
+fn many_shapes() -> Vec<Shape> {
+    let moving = (1..150_u8).map(f32::from).map(|number| Shape {
+        inverse_mass: 0.25 + number / 64.0,
+        inverse_inertia: [1.0, 1.5, 2.0].map(|k| k + number / 32.0),
+    });
+    std::iter::once(Shape::STATIC).chain(moving).collect()
+}
+
+/// The scene whose moving bodies have `shapes` in turn.
+fn with_shapes(seed: u64, shapes: usize) -> (Vec<Body>, Vec<Collision>) {
+    let (mut bodies, collisions) = scene(seed);
+    for (number, body) in (0_u32..).zip(&mut bodies).filter(|(_, body)| body.shape != 0) {
+        body.shape = 1 + 7 * number % (shapes as u32 - 1);
+    }
+    (bodies, collisions)
+}
+
+#[test]
+fn every_body_can_bring_a_mass_of_its_own() {
+    let shapes = many_shapes();
+    for kinematic in [false, true] {
+        let parameters = ordered(Order::AsGiven).with_kinematic(kinematic);
+        let scene = with_shapes(31, shapes.len());
+        let distinct: std::collections::BTreeSet<u32> =
+            scene.0.iter().map(|body| body.shape).collect();
+        assert!(distinct.len() > 20 && distinct.iter().any(|shape| *shape > 64), "{distinct:?}");
+        compare(&scene, &shapes, &parameters);
+    }
+}
+
+#[test]
+fn a_streamed_mass_counts_as_one_of_the_table() {
+    let (bodies, collisions) = with_shapes(5, 64);
+    for profile in [&FLOAT, &NAIVE, &MIXED] {
+        for shortcuts in [false, true] {
+            let config =
+                BoardConfig { profile, shortcuts, inertia: Inertia::World, ..Default::default() };
+            let step = |shapes: &[Shape]| {
+                let (board, mut accelerator) = open_with(config, None, shapes);
+                let mut bodies = bodies.clone();
+                let parameters = ordered(Order::AsGiven);
+                let report = accelerator.step(&mut bodies, &collisions, &parameters);
+                let cycles = report.expect("a step").cycles;
+                assert_eq!(board.violations(), []);
+                (bits(&bodies), cycles)
+            };
+            let shapes = many_shapes();
+            assert_eq!(step(&shapes), step(&shapes[..64]), "{config:?}");
+        }
+    }
+}
+
+#[test]
+fn more_shapes_than_entries_need_the_extension() {
+    let isotropic = BoardConfig::default();
+    for config in [isotropic, old()] {
+        let (_board, mut accelerator) = open_with(config, None, &both_inertias()[1]);
+        let error = accelerator.set_shapes(&[Shape::isotropic(1.0, 6.0); 65]).expect_err("65");
+        assert!(error.to_string().contains("takes at most 64"), "{error}");
+        assert!(error.to_string().contains("streamed masses"), "{error}");
+    }
+}
+
 /// A board of interface version 1.1.
 fn old() -> BoardConfig {
     let mut config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };

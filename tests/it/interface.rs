@@ -194,6 +194,7 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::features::KINEMATIC.mask(), 1 << 6);
     assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
     assert_eq!(control::features::WARM_START.mask(), 1 << 8);
+    assert_eq!(control::features::STREAMED_MASSES.mask(), 1 << 9);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,

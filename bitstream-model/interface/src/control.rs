@@ -61,6 +61,9 @@ pub mod flags {
     /// The impulses go out in front of the results. Only in a bitstream with
     /// [`features::WARM_START`](super::features::WARM_START).
     pub const IMPULSES_OUT: Field = Field::bit("impulses_out", 4, Access::ReadWrite);
+    /// Each velocity record brings the inverse mass of its body, and the shape table is not used. Only in a
+    /// bitstream with [`features::STREAMED_MASSES`](super::features::STREAMED_MASSES).
+    pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 5, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -97,6 +100,9 @@ pub mod features {
     /// Impulses can come in and go out ([`flags::WARM_START`](super::flags::WARM_START),
     /// [`flags::IMPULSES_OUT`](super::flags::IMPULSES_OUT)).
     pub const WARM_START: Field = Field::bit("warm_start", 8, Access::ReadOnly);
+    /// Velocity records with world inertia can bring the inverse mass of their body
+    /// ([`flags::STREAMED_MASSES`](super::flags::STREAMED_MASSES)).
+    pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 9, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -270,6 +276,7 @@ pub const FLAGS: Register = row(
         flags::PAIR_FRICTION,
         flags::WARM_START,
         flags::IMPULSES_OUT,
+        flags::STREAMED_MASSES,
     ],
     OURS,
 );
@@ -335,6 +342,7 @@ pub const FEATURES: Register = read_only(
         features::KINEMATIC,
         features::PAIR_FRICTION,
         features::WARM_START,
+        features::STREAMED_MASSES,
     ],
 );
 /// Numbers of streams.

@@ -4,7 +4,7 @@
 
 use super::control::features;
 use super::number::StreamFormat;
-use super::profile::{Flow, Geometry, Variant};
+use super::profile::{Flow, Geometry, Inertia, Variant};
 use super::register::Field;
 
 /// The abilities of a bitstream beyond version 1.1.
@@ -18,15 +18,27 @@ pub struct Extensions {
     pub pair_friction: bool,
     /// Impulses of collisions can come in and go out.
     pub warm_start: bool,
+    /// Velocity records with world inertia can bring the inverse mass of their body.
+    pub streamed_masses: bool,
 }
 
 impl Extensions {
     /// None: a bitstream of version 1.1.
-    pub const NONE: Self =
-        Self { spin_damping: false, kinematic: false, pair_friction: false, warm_start: false };
+    pub const NONE: Self = Self {
+        spin_damping: false,
+        kinematic: false,
+        pair_friction: false,
+        warm_start: false,
+        streamed_masses: false,
+    };
     /// All of this version.
-    pub const ALL: Self =
-        Self { spin_damping: true, kinematic: true, pair_friction: true, warm_start: true };
+    pub const ALL: Self = Self {
+        spin_damping: true,
+        kinematic: true,
+        pair_friction: true,
+        warm_start: true,
+        streamed_masses: true,
+    };
 
     /// The extensions that the FEATURES register reports.
     #[must_use]
@@ -36,6 +48,7 @@ impl Extensions {
             kinematic: features::KINEMATIC.is_set(features),
             pair_friction: features::PAIR_FRICTION.is_set(features),
             warm_start: features::WARM_START.is_set(features),
+            streamed_masses: features::STREAMED_MASSES.is_set(features),
         }
     }
 
@@ -47,15 +60,17 @@ impl Extensions {
             | bit(features::KINEMATIC, self.kinematic)
             | bit(features::PAIR_FRICTION, self.pair_friction)
             | bit(features::WARM_START, self.warm_start)
+            | bit(features::STREAMED_MASSES, self.streamed_masses)
     }
 
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
-    /// Impulses need passes one after the other, and a stripe for their records.
+    /// Impulses need passes one after the other, and a stripe for their records. A streamed mass needs the
+    /// rows of a world inertia beside it, and an array of numbers for all bodies.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
-        let Variant { profile, numbers, .. } = variant;
+        let Variant { profile, numbers, inertia } = variant;
         let absolute = matches!(profile.geometry, Geometry::Absolute);
         Self {
             spin_damping: true,
@@ -65,6 +80,9 @@ impl Extensions {
             pair_friction: absolute && matches!(numbers.collisions, StreamFormat::F32),
             warm_start: profile.stripes.warm_collisions.is_some()
                 && matches!(numbers.collisions, StreamFormat::F32),
+            streamed_masses: matches!(inertia, Inertia::World)
+                && matches!(profile.flow, Flow::Passes)
+                && matches!(numbers.bodies, StreamFormat::F32),
         }
     }
 
@@ -76,6 +94,7 @@ impl Extensions {
             kinematic: self.kinematic && other.kinematic,
             pair_friction: self.pair_friction && other.pair_friction,
             warm_start: self.warm_start && other.warm_start,
+            streamed_masses: self.streamed_masses && other.streamed_masses,
         }
     }
 }

@@ -9,8 +9,9 @@
 //!                lane 0   lane 1   lane 2   lane 3
 //! velocity    0  v.x      v.y      v.z      shape
 //!             1  w.x      w.y      w.z      0
-//!             2  I.xx     I.yy     I.zz     0          with world inertia only: the inverse
-//!             3  I.xy     I.xz     I.yz     0          inertia about world axes
+//!             2  I.xx     I.yy     I.zz     m or 0     with world inertia only: the inverse
+//!             3  I.xy     I.xz     I.yz     0          inertia about world axes, and the inverse
+//!                                                      mass where masses are streamed
 //! collision   0  n.x      n.y      n.z      count
 //! (absolute)  1  pA.x     pA.y     pA.z     bodyA
 //!             2  pB.x     pB.y     pB.z     bodyB
@@ -67,7 +68,8 @@ pub mod velocity {
     pub const ANGULAR: usize = 1;
     /// Rows of a record with world inertia.
     pub const WORLD_ROWS: usize = 4;
-    /// Diagonal of the inverse inertia: xx, yy, zz; the word beside it is 0.
+    /// Diagonal of the inverse inertia: xx, yy, zz; the word beside it is the inverse mass in steps with
+    /// streamed masses, else 0.
     pub const DIAGONAL: usize = 2;
     /// The rest of the inverse inertia: xy, xz, yz; the word beside it is 0.
     pub const OFF_DIAGONAL: usize = 3;

@@ -70,6 +70,8 @@ pub(crate) struct Arguments {
     pub(crate) integrate: bool,
     /// Whether bodies of inverse mass 0 have the velocity of their record.
     pub(crate) kinematic: bool,
+    /// Whether each body brings its inverse mass, in place of its shape's.
+    pub(crate) streamed_masses: bool,
     /// Whether impulses come in with the collisions, in a pass in front of the others of each kind.
     pub(crate) warm_start: bool,
     /// Whether the impulses go out in front of the results.
@@ -208,7 +210,8 @@ impl Registers {
     pub(super) fn arguments(&self) -> Arguments {
         let time_step = self.number(TIME_STEP.offset);
         let set = self.argument(FLAGS.offset);
-        let Extensions { kinematic, pair_friction, warm_start, .. } = self.extensions;
+        let Extensions { kinematic, pair_friction, warm_start, streamed_masses, .. } =
+            self.extensions;
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
@@ -216,6 +219,7 @@ impl Registers {
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
             integrate: flags::INTEGRATE.is_set(set),
             kinematic: kinematic && flags::KINEMATIC.is_set(set),
+            streamed_masses: streamed_masses && flags::STREAMED_MASSES.is_set(set),
             warm_start: warm_start && flags::WARM_START.is_set(set),
             impulses_out: warm_start && flags::IMPULSES_OUT.is_set(set),
             solver: SolverParameters {

@@ -98,6 +98,8 @@ pub(crate) struct Accelerator {
     pub(crate) pipeline: Pipeline,
     pub(crate) velocities: Vec<Velocity>,
     pub(crate) shape_of: Vec<u8>,
+    /// With streamed masses, that of each body.
+    pub(crate) inverse_masses: Vec<f32>,
     /// With world inertia, that of each body.
     pub(crate) inertias: Vec<arithmetic::inertia::Stored>,
     pub(crate) impulses: Vec<Impulses>,
@@ -127,6 +129,7 @@ impl Accelerator {
             ),
             velocities: Vec::new(),
             shape_of: Vec::new(),
+            inverse_masses: Vec::new(),
             inertias: Vec::new(),
             impulses: Vec::new(),
             window: None,
@@ -420,6 +423,10 @@ impl Accelerator {
         self.velocities.resize(bodies, Velocity::default());
         self.shape_of.clear();
         self.shape_of.resize(bodies, 0);
+        self.inverse_masses.clear();
+        if arguments.streamed_masses {
+            self.inverse_masses.resize(bodies, 0.0);
+        }
         self.inertias.clear();
         if variant.inertia == Inertia::World {
             self.inertias.resize(bodies, arithmetic::inertia::Stored::default());

@@ -33,6 +33,7 @@ pub(crate) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
 pub(super) struct Arrival {
     pub(super) velocity: Velocity,
     pub(super) shape: u8,
+    pub(super) inverse_mass: f32,
     /// With world inertia.
     pub(super) inertia: inertia::Stored,
 }
@@ -68,19 +69,23 @@ impl Accelerator {
         reader: &mut Reader<'_>,
     ) -> Result<Arrival, PacketError> {
         let format = self.variant.numbers.bodies;
-        let ((velocity, shape), inertia) = match self.variant.inertia {
+        let ((velocity, shape), inertia, streamed) = match self.variant.inertia {
             Inertia::Isotropic => {
                 let rows = reader.record::<{ velocity::ROWS }>();
-                (decode::velocity(format, &rows), [0.0; 6])
+                (decode::velocity(format, &rows), [0.0; 6], None)
             }
             Inertia::World => {
                 let rows = reader.record::<{ velocity::WORLD_ROWS }>();
                 let inertia = decode::world_inertia(format, &rows);
+                let streamed = decode::inverse_mass(format, &rows);
+                let streamed = self.arguments.streamed_masses.then_some(streamed);
                 let rows = [rows[velocity::LINEAR], rows[velocity::ANGULAR]];
                 let inertia = self.stored(self.variant.numbers.velocities, inertia);
-                (decode::velocity(format, &rows), inertia)
+                (decode::velocity(format, &rows), inertia, streamed)
             }
         };
+        // A body that brings its mass needs no shape.
+        let shape = if streamed.is_some() { 0 } else { shape };
         let known = (shape as usize) < self.registers.shapes().len();
         let Some(shape) = u8::try_from(shape).ok().filter(|_| known) else {
             return Err(PacketError {
@@ -90,10 +95,24 @@ impl Accelerator {
             });
         };
         // The words of a static body are ignored: thesis16 has none for 0.
-        let moves = self.registers.shapes()[usize::from(shape)].inverse_mass != 0.0;
+        let of_shape = || self.registers.shapes()[usize::from(shape)].inverse_mass;
+        let inverse_mass = streamed.unwrap_or_else(of_shape);
+        let moves = inverse_mass != 0.0;
         let velocity =
             if moves || self.arguments.kinematic { velocity } else { Velocity::default() };
-        Ok(Arrival { velocity: self.stored_velocity(velocity), shape, inertia })
+        let velocity = self.stored_velocity(velocity);
+        Ok(Arrival { velocity, shape, inverse_mass, inertia })
+    }
+
+    /// Mass properties of a loaded body.
+    #[inline]
+    pub(super) fn mass_of(&self, body: usize) -> Mass {
+        let inertia = self.inertias.get(body).copied().unwrap_or_default();
+        let mass = self.mass(self.shape_of[body], inertia);
+        match self.inverse_masses.get(body) {
+            Some(inverse_mass) => Mass { inverse_mass: *inverse_mass, ..mass },
+            None => mass,
+        }
     }
 
     /// Mass properties of a body: its shape's, with world inertia its own inertia.

@@ -130,6 +130,9 @@ impl Accelerator {
             }
             self.velocities[body] = arrival.velocity;
             self.shape_of[body] = arrival.shape;
+            if let Some(inverse_mass) = self.inverse_masses.get_mut(body) {
+                *inverse_mass = arrival.inverse_mass;
+            }
         }
         Ok(())
     }
@@ -375,11 +378,7 @@ impl Accelerator {
         if sides[0] == sides[1] {
             return Err(error(ErrorCode::SelfCollision));
         }
-        let mass = |body: usize| {
-            let inertia = self.inertias.get(body).copied().unwrap_or_default();
-            self.mass(self.shape_of[body], inertia)
-        };
-        let (a, b) = (mass(sides[0]), mass(sides[1]));
+        let [a, b] = sides.map(|body| self.mass_of(body));
         if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
             return Err(error(ErrorCode::StaticPair));
         }
@@ -444,7 +443,7 @@ impl Accelerator {
         for body in poses.done..poses.done + records {
             let pose = decode::pose(format, &reader.record());
             let velocity = self.velocities[body];
-            let moves = self.mass(self.shape_of[body], [0.0; 6]).inverse_mass != 0.0;
+            let moves = self.mass_of(body).inverse_mass != 0.0;
             let (pose, velocity) = self.integrated(moves, pose, velocity);
             let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
             sent = sent.wrapping_add(sum);

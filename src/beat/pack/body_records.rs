@@ -15,6 +15,7 @@ use crate::simd::Vectors;
 /// Writes velocity records.
 pub(crate) struct Velocities<'a, 'b> {
     shapes: &'a [Shape],
+    streamed_masses: bool,
     dealer: StripeWriter<'a, 'b>,
     inertia: Inertia,
 }
@@ -24,7 +25,8 @@ impl<'a, 'b> Velocities<'a, 'b> {
     pub(crate) fn new(target: Target<'a>, channels: &'a mut [&'b mut [Beat]]) -> Self {
         let layout = Segment::Velocities.layout(target.variant);
         let inertia = target.variant.inertia;
-        Self { shapes: target.shapes, dealer: StripeWriter::new(&layout, channels), inertia }
+        let Target { shapes, streamed_masses, .. } = target;
+        Self { shapes, streamed_masses, dealer: StripeWriter::new(&layout, channels), inertia }
     }
 
     /// Writes the records of the next block of bodies. A block has
@@ -36,7 +38,8 @@ impl<'a, 'b> Velocities<'a, 'b> {
                 self.dealer.write(vectors, &mut Isotropic(bodies));
             }
             Inertia::World => {
-                let mut records = World { bodies, shapes: self.shapes };
+                let Self { shapes, streamed_masses, .. } = *self;
+                let mut records = World { bodies, shapes, streamed_masses };
                 self.dealer.write(vectors, &mut records);
             }
         }
@@ -94,6 +97,7 @@ impl Records<{ velocity::ROWS }> for Isotropic<'_> {
 struct World<'a> {
     bodies: &'a [Body],
     shapes: &'a [Shape],
+    streamed_masses: bool,
 }
 
 impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
@@ -104,7 +108,8 @@ impl Records<{ velocity::WORLD_ROWS }> for World<'_> {
 
     #[inline(always)]
     fn some<const N: usize>(&mut self, nth: usize, to: &mut impl Rows) -> Option<()> {
-        let record = |body: &Body| world_velocity(body, self.shapes);
+        let Self { shapes, streamed_masses, .. } = *self;
+        let record = |body: &Body| world_velocity(body, shapes, streamed_masses);
         give::<{ velocity::WORLD_ROWS }, N>(self.bodies, nth, record, to)
     }
 }
@@ -140,11 +145,16 @@ fn give<const ROWS: usize, const N: usize>(
     Some(())
 }
 
-/// The velocity record of a body with its inertia.
+/// The velocity record of a body with its inertia, and with its inverse mass where masses are streamed.
 #[inline(always)]
-fn world_velocity(body: &Body, shapes: &[Shape]) -> Record<{ velocity::WORLD_ROWS }> {
+fn world_velocity(
+    body: &Body,
+    shapes: &[Shape],
+    streamed_masses: bool,
+) -> Record<{ velocity::WORLD_ROWS }> {
     let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
     let shape = shape.unwrap_or(&Shape::STATIC);
     let inertia = record::inertia::about_world_axes(shape, body.pose.orientation);
-    record::velocity::encode_world(body, &inertia)
+    let inverse_mass = if streamed_masses { shape.inverse_mass } else { 0.0 };
+    record::velocity::encode_world(body, &inertia, inverse_mass)
 }

@@ -10,6 +10,8 @@ use crate::validate::Quick;
 pub(crate) struct Target<'a> {
     pub(crate) variant: &'a Variant,
     pub(crate) shapes: &'a [Shape],
+    /// Whether velocity records bring the inverse mass of their body.
+    pub(crate) streamed_masses: bool,
     /// The check of everything that is packed; `None` packs unchecked.
     pub(crate) quick: Option<&'a Quick<'a>>,
 }

@@ -216,7 +216,8 @@ mod tests {
             let scene = preflight(&bodies, &list, &shapes, &parameters, &limits);
             let quick = Quick::new(scene.expect("limits that rule nothing out"));
             for quick in [None, Some(&quick)] {
-                let target = Target { variant: &variant, shapes: &shapes, quick };
+                let target =
+                    Target { variant: &variant, shapes: &shapes, streamed_masses: false, quick };
                 let (mut ends, mut statics) = (Table::default(), Vec::new());
                 let into = Survey { ends: &mut ends, statics: &mut statics };
                 assert!(survey(target, &bodies, count, into, &mut PackPool::alone()));

@@ -279,7 +279,7 @@ fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
 }
 
 fn target(spec: &Spec) -> Target<'_> {
-    Target { variant: &spec.variant, shapes: &SHAPES, quick: None }
+    Target { variant: &spec.variant, shapes: &SHAPES, streamed_masses: false, quick: None }
 }
 
 /// The beats of collisions, with words in place of the bodies' indices.

@@ -125,7 +125,12 @@ impl Input {
         let parameters = StepParameters::default();
         let quick = preflight(bodies, collisions, &SHAPES, &parameters, limits).map(Quick::new);
         let quick = quick.expect("nothing else is wrong");
-        let target = Target { variant: &limits.variant, shapes: &SHAPES, quick: Some(&quick) };
+        let target = Target {
+            variant: &limits.variant,
+            shapes: &SHAPES,
+            streamed_masses: false,
+            quick: Some(&quick),
+        };
         // An earlier step has left a longer or a shorter table.
         let mut ends = [Table::default(), Table::default()];
         Survey { ends: &mut ends[0], statics: &mut Vec::new() }.ends(3000).fill(End::at([7.0; 3]));

@@ -123,7 +123,7 @@ fn said_and_doubted(
     let scene = preflight(bodies, collisions, shapes, &parameters, limits).ok()?;
     let quick = Quick::new(scene);
     let variant = &limits.variant;
-    let target = Target { variant, shapes, quick: Some(&quick) };
+    let target = Target { variant, shapes, streamed_masses: false, quick: Some(&quick) };
     let (mut ends, mut statics) = (Table::default(), Vec::new());
     let count = bodies.len();
     let mut velocities = buffers(variant, Segment::Velocities, count);

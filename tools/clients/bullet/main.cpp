@@ -65,7 +65,7 @@ const std::vector<Scene> &scenes() {
         {"sleeping", "125 cubes come to rest", sleeping, false},
         {"ccd", "a fast ball against a thin wall", ccd, false},
         {"joints", "a chain, which stays Bullet's, beside boxes on the board", joints, false},
-        {"masses", "more masses than the board's 64", masses, false},
+        {"masses", "more masses than the table of the board", masses, false},
         {"warm", "1,000 jumbled cubes, a step with the last one's impulses and one without", warmth, false},
         {"spread", "pile and tower, the bodies shifted by at most 1 mm", spread, true},
         {"time", "a step of jumbled cubes, both solvers on the same contacts, 10 + 10 passes", timing, true},

@@ -1,4 +1,4 @@
-// What the board does not take, and Bullet's own solver does.
+// Steps that Bullet's own solver takes, and masses beyond the table of the board.
 #include "table.h"
 
 void joints(Table &table) {
@@ -42,5 +42,5 @@ void masses(Table &table) {
         },
         true);
     table.add(both, 0, "125 cubes of 125 masses: deepest after 1 s", "mm");
-    table.add(both, 1, "steps with contacts, which Bullet took over", "", atLeast(1));
+    table.add(both, 1, "steps with contacts, which Bullet took over", "", atMost(0));
 }

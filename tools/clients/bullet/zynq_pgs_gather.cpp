@@ -4,7 +4,8 @@
 
 namespace {
 
-// Entries of the board's table of shapes.
+// Shapes that are kept from step to step: the entries of the board's table. A step may have more, which not
+// every board takes.
 const size_t SHAPES = 64;
 // A collision has one normal, a manifold has one for each point. Points share a collision if their normals
 // differ by less than 2.6 degrees.
@@ -101,17 +102,17 @@ void ZynqPgsGather::take(btCollisionObject **bodies, int numBodies, btPersistent
     m_takenManifolds.insert(m_takenManifolds.end(), manifolds, manifolds + numManifolds);
 }
 
-bool ZynqPgsGather::gather(const btContactSolverInfo &info) {
-    const bool fresh = m_shapes.empty();
+void ZynqPgsGather::gather(const btContactSolverInfo &info) {
+    m_fresh = m_shapes.empty();
     m_tooManyShapes = false;
-    if (fresh) shapeOf(0, btVector3(0, 0, 0));  // STATIC_SHAPE
+    if (m_fresh) shapeOf(0, btVector3(0, 0, 0));  // STATIC_SHAPE
     for (btPersistentManifold *manifold : m_takenManifolds) addManifold(manifold, info);
-    if (!m_tooManyShapes) return true;
+    if (!m_tooManyShapes) return;
 
-    // Shapes of bodies that are gone or asleep may fill the table: try once with an empty one.
+    // Shapes of bodies that are gone or asleep may fill the table: again with the shapes of this step alone.
     clearShapes();
     clearGathered();
-    return !fresh && gather(info);
+    gather(info);
 }
 
 void ZynqPgsGather::reverse() {
@@ -216,7 +217,7 @@ uint32_t ZynqPgsGather::shapeOf(btScalar inverseMass, const btVector3 &inverseIn
                                       shape.inverse_inertia[2]};
     const auto found = m_shapeIndices.find(key);
     if (found != m_shapeIndices.end()) return found->second;
-    if (m_shapes.size() == SHAPES) {
+    if (m_shapes.size() >= SHAPES && !m_fresh) {
         m_tooManyShapes = true;
         return STATIC_SHAPE;
     }

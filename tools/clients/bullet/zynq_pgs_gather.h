@@ -23,9 +23,8 @@ public:
     void clear();
     // Takes an island, or some.
     void take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds, int numManifolds);
-    // Makes collisions and bodies of everything taken. False if the masses and inertias do not fit into the
-    // board's table.
-    bool gather(const btContactSolverInfo &info);
+    // Makes collisions and bodies of everything taken.
+    void gather(const btContactSolverInfo &info);
     // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision.
     void writeVelocities(const btContactSolverInfo &info);
     // Puts the collisions in reverse order.
@@ -81,4 +80,6 @@ private:
     std::map<std::array<float, 4>, uint32_t> m_shapeIndices;
     uint64_t m_shapesVersion = 0;
     bool m_tooManyShapes = false;
+    // Whether the table was empty when the step began.
+    bool m_fresh = true;
 };

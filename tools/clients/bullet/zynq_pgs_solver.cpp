@@ -68,9 +68,8 @@ btScalar ZynqPgsSolver::solveGroup(btCollisionObject **bodies, int numBodies,
 
 void ZynqPgsSolver::allSolved(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {
     if (m_gather.takenBodies().empty()) return;
-    const bool fits = m_gather.gather(info);
-    if (!fits) say("the step has more than 64 different masses and inertias: Bullet's own solver takes it");
-    if (fits && (m_gather.collisions().empty() || stepBoard(info)))
+    m_gather.gather(info);
+    if (m_gather.collisions().empty() || stepBoard(info))
         m_gather.writeVelocities(info);
     else
         fallBack(info, debugDrawer);

@@ -162,6 +162,12 @@ pub(crate) fn world_inertia(format: StreamFormat, rows: &[Row; velocity::WORLD_R
     [xx, yy, zz, xy, xz, yz]
 }
 
+/// The inverse mass in a velocity record of a step with streamed masses.
+#[inline(always)]
+pub(crate) fn inverse_mass(format: StreamFormat, rows: &[Row; velocity::WORLD_ROWS]) -> f32 {
+    number(format, rows[velocity::DIAGONAL][WORD_LANE])
+}
+
 /// A pose record.
 #[inline(always)]
 pub(crate) fn pose(format: StreamFormat, rows: &[Row; pose::ROWS]) -> Pose {

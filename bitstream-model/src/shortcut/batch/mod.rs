@@ -193,20 +193,25 @@ impl Batch {
         if self.lines.len() < lines {
             self.lines.resize(lines, Line::default());
         }
-        let Properties { shape_of, masses, inertias } = properties;
+        let Properties { shape_of, masses, inverse_masses, inertias } = properties;
         let own = &mut self.lines[ROWS_APART as usize / 2..];
         let bodies = velocities.chunks(COPIED_TOGETHER).zip(shape_of.chunks(COPIED_TOGETHER));
         let rounded = self.precision == Precision::Binary16;
+        let parts = (0..).step_by(COPIED_TOGETHER).zip(bodies);
         self.crew.each(
-            bodies.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
-            |((velocities, shapes), lines)| {
+            parts.zip(own.chunks_mut(COPIED_TOGETHER / 2)),
+            |((first, (velocities, shapes)), lines)| {
+                let inverse_masses = inverse_masses.get(first..).unwrap_or_default();
                 for (body, (velocity, shape)) in velocities.iter().zip(shapes).enumerate() {
-                    let mass = &masses[usize::from(*shape)];
+                    let mut mass = masses[usize::from(*shape)];
+                    if let Some(inverse_mass) = inverse_masses.get(body) {
+                        mass.inverse_mass = *inverse_mass;
+                    }
                     let line = &mut lines[body / 2];
                     if rounded {
                         line.put(body % 2 == 1, velocity, &mass.rounded::<Half>());
                     } else {
-                        line.put(body % 2 == 1, velocity, mass);
+                        line.put(body % 2 == 1, velocity, &mass);
                     }
                 }
             },

@@ -87,17 +87,36 @@ pub(crate) struct Properties<'a> {
     pub(crate) shape_of: &'a [u8],
     /// The mass properties of each shape.
     pub(crate) masses: &'a [Mass],
+    /// With streamed masses that of each body.
+    pub(crate) inverse_masses: &'a [f32],
     /// With world inertia that of each body.
     pub(crate) inertias: &'a [Stored],
+}
+
+#[cfg(test)]
+impl<'a> Properties<'a> {
+    /// Bodies with the mass properties of their shapes.
+    pub(crate) const fn of_shapes(shape_of: &'a [u8], masses: &'a [Mass]) -> Self {
+        Self { shape_of, masses, inverse_masses: &[], inertias: &[] }
+    }
 }
 
 impl Properties<'_> {
     /// The mass properties of a body.
     pub(crate) fn mass(&self, body: usize) -> Mass {
-        let mass = self.masses[usize::from(self.shape_of[body])];
-        match self.inertias.get(body) {
-            Some(inertia) => Mass { inverse_inertia: *inertia, ..mass },
-            None => mass,
+        let mut mass = self.masses[usize::from(self.shape_of[body])];
+        if let Some(inertia) = self.inertias.get(body) {
+            mass.inverse_inertia = *inertia;
         }
+        if let Some(inverse_mass) = self.inverse_masses.get(body) {
+            mass.inverse_mass = *inverse_mass;
+        }
+        mass
+    }
+
+    /// Whether a body moves.
+    pub(crate) fn moves(&self, body: usize) -> bool {
+        let of_shape = || self.masses[usize::from(self.shape_of[body])].inverse_mass;
+        self.inverse_masses.get(body).copied().unwrap_or_else(of_shape) != 0.0
     }
 }

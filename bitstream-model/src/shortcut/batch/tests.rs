@@ -70,7 +70,7 @@ pub(crate) struct Step {
 impl Step {
     pub(crate) fn properties(&self) -> Properties<'_> {
         let Self { shape_of, inertias, .. } = self;
-        Properties { shape_of, masses: &MASSES, inertias }
+        Properties { inertias, ..Properties::of_shapes(shape_of, &MASSES) }
     }
 
     /// The passes, the first `contact` of them contact passes.
@@ -123,13 +123,22 @@ impl Step {
             let mut sums = vec![0; part.len()];
             if self.given.is_empty() {
                 let streams = streams.each_ref().map(Vec::as_slice);
-                batch.decode(streams, part.len(), &self.shape_of, masses, &mut sums)
+                batch.decode(
+                    streams,
+                    part.len(),
+                    Properties::of_shapes(&self.shape_of, masses),
+                    &mut sums,
+                )
             } else {
                 let pairs = [0, 1].map(|kind| self.with_impulses(part.clone(), kind, &streams[3]));
                 streams[3] = pairs[0].concat();
                 let streams = streams.each_ref().map(Vec::as_slice);
-                let decoded =
-                    batch.decode_warm(streams, part.len(), &self.shape_of, masses, &mut sums);
+                let decoded = batch.decode_warm(
+                    streams,
+                    part.len(),
+                    Properties::of_shapes(&self.shape_of, masses),
+                    &mut sums,
+                );
                 for (contact, pairs) in [true, false].into_iter().zip(&pairs) {
                     let mut of_impulses = vec![0; part.len()];
                     batch.give(contact, part.start, pairs, &mut of_impulses);
@@ -514,7 +523,8 @@ fn two_static_bodies_are_refused() {
     let streams = step.streams(0..2);
     let error = PacketError { code: ErrorCode::StaticPair, channel: 0, beat: 1 };
     let streams = streams.each_ref().map(Vec::as_slice);
-    let found = batch.decode(streams, 2, &step.shape_of, &MASSES, &mut [0; 2]);
+    let found =
+        batch.decode(streams, 2, Properties::of_shapes(&step.shape_of, &MASSES), &mut [0; 2]);
     assert_eq!(found, Err(error));
 }
 

@@ -70,6 +70,8 @@ pub(crate) struct BodyRows<'a> {
 struct Loaded<'a> {
     velocities: &'a mut [Velocity],
     shape_of: &'a mut [u8],
+    /// With streamed masses only.
+    inverse_masses: &'a mut [f32],
     /// With world inertia only.
     inertias: &'a mut [Stored],
 }
@@ -119,7 +121,7 @@ impl BodyRows<'_> {
         to: Loaded<'_>,
         kinematic: bool,
     ) -> (u32, Option<usize>) {
-        let Loaded { velocities, shape_of, inertias } = to;
+        let Loaded { velocities, shape_of, inverse_masses, inertias } = to;
         let turns = Turns { streams: STREAMS };
         let (period, stride) =
             const { (period(STREAMS, ROWS), period(STREAMS, ROWS) * ROWS / STREAMS) };
@@ -140,18 +142,27 @@ impl BodyRows<'_> {
                 }
                 let moving = [rows[velocity::LINEAR], rows[velocity::ANGULAR]];
                 let (loaded, shape) = decode::velocity(StreamFormat::F32, &moving);
-                let (Some(mass), Ok(shape)) = (masses.get(shape as usize), u8::try_from(shape))
-                else {
-                    wrong = wrong.into_iter().chain([first + body]).min();
-                    continue;
+                let world = <&[Row; velocity::WORLD_ROWS]>::try_from(rows.as_slice());
+                let inverse_mass = match (inverse_masses.get_mut(body), world) {
+                    (Some(streamed), Ok(rows)) => {
+                        *streamed = decode::inverse_mass(StreamFormat::F32, rows);
+                        *streamed
+                    }
+                    _ => {
+                        let (Some(mass), Ok(shape)) =
+                            (masses.get(shape as usize), u8::try_from(shape))
+                        else {
+                            wrong = wrong.into_iter().chain([first + body]).min();
+                            continue;
+                        };
+                        shape_of[body] = shape;
+                        mass.inverse_mass
+                    }
                 };
                 // The words of a body at rest are ignored.
-                let moves = mass.inverse_mass != 0.0 || kinematic;
+                let moves = inverse_mass != 0.0 || kinematic;
                 velocities[body] = if moves { loaded } else { Velocity::default() };
-                shape_of[body] = shape;
-                if let (Ok(rows), Some(inertia)) =
-                    (rows.as_slice().try_into(), inertias.get_mut(body))
-                {
+                if let (Ok(rows), Some(inertia)) = (world, inertias.get_mut(body)) {
                     *inertia = decode::world_inertia(StreamFormat::F32, rows);
                 }
             }
@@ -176,7 +187,8 @@ impl BodyRows<'_> {
 
 /// The shapes, masses and inertias of the bodies of the step under way.
 pub(super) fn properties<'a>(accelerator: &'a Accelerator, masses: &'a [Mass]) -> Properties<'a> {
-    Properties { shape_of: &accelerator.shape_of, masses, inertias: &accelerator.inertias }
+    let Accelerator { shape_of, inverse_masses, inertias, .. } = accelerator;
+    Properties { shape_of, masses, inverse_masses, inertias }
 }
 
 impl Deferred {
@@ -222,14 +234,18 @@ impl Deferred {
         let kinematic = accelerator.arguments.kinematic;
         let velocities = accelerator.velocities[bodies.clone()].chunks_mut(LOADED_TOGETHER);
         let shapes = accelerator.shape_of[bodies.clone()].chunks_mut(LOADED_TOGETHER);
+        // Without world inertia there is none, nor a mass without streamed ones.
         let inertias = accelerator.inertias.get_mut(bodies.clone()).unwrap_or_default();
-        // Without world inertia there is none.
         let none = std::iter::repeat_with(Default::default);
         let inertias = inertias.chunks_mut(LOADED_TOGETHER).chain(none);
+        let inverse_masses = accelerator.inverse_masses.get_mut(bodies.clone()).unwrap_or_default();
+        let none = std::iter::repeat_with(Default::default);
+        let inverse_masses = inverse_masses.chunks_mut(LOADED_TOGETHER).chain(none);
         let (sum, wrong) = (AtomicU32::new(0), AtomicUsize::new(usize::MAX));
-        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes).zip(inertias));
-        batch.share(parts, |(first, ((velocities, shape_of), inertias))| {
-            let to = Loaded { velocities, shape_of, inertias };
+        let parts = bodies.step_by(LOADED_TOGETHER).zip(velocities.zip(shapes));
+        let parts = parts.zip(inverse_masses.zip(inertias));
+        batch.share(parts, |((first, (velocities, shape_of)), (inverse_masses, inertias))| {
+            let to = Loaded { velocities, shape_of, inverse_masses, inertias };
             let (of_part, wrong_body) = rows.load(first, masses, to, kinematic);
             sum.fetch_add(of_part, Ordering::Relaxed);
             wrong.fetch_min(wrong_body.unwrap_or(usize::MAX), Ordering::Relaxed);
@@ -304,7 +320,10 @@ impl Deferred {
             *view = memory.view(*source, *count)?;
         }
         let rows = BodyRows { views, turns, rows, first: segment.done };
-        let bad = rows.without_shape(records, self.decoded.masses.len());
+        let bad = match self.decoded.needs_shapes {
+            true => rows.without_shape(records, self.decoded.masses.len()),
+            false => None,
+        };
         Some(bad.map_or(records, |body| body - segment.done))
     }
 

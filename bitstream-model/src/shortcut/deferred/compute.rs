@@ -5,6 +5,7 @@
 //! passes are computed again from the loaded velocities on, which stay as they are until then.
 
 use super::Deferred;
+use super::bodies::properties;
 use crate::accelerator::Accelerator;
 use crate::accelerator::control::Arguments;
 use crate::shortcut::batch::{Plan, Properties};
@@ -34,8 +35,10 @@ impl Deferred {
             batch.restart();
             self.computed = 0;
         }
-        let Accelerator { arguments, velocities, shape_of, inertias, .. } = accelerator;
-        let (plan, properties) = (plan(arguments), Properties { shape_of, masses, inertias });
+        let Accelerator { arguments, velocities, shape_of, inverse_masses, inertias, .. } =
+            accelerator;
+        let properties = Properties { shape_of, masses, inverse_masses, inertias };
+        let plan = plan(arguments);
         batch.run(self.computed..pass, &plan, properties, velocities);
         batch.leave(velocities);
         if collisions > 0 {
@@ -48,14 +51,14 @@ impl Deferred {
     /// Computes a pass under way as if it had ended, if its impulses go out. Returns whether the impulses
     /// that have to go out are there.
     pub(super) fn impulses_are_there(&mut self, accelerator: &Accelerator, pass: u32) -> bool {
-        let Accelerator { arguments, velocities, shape_of, inertias, .. } = accelerator;
+        let Accelerator { arguments, velocities, .. } = accelerator;
         if !arguments.sends_impulses(pass) {
             return true;
         }
         if self.decoded.batch.len() < arguments.collisions as usize {
             return false;
         }
-        let properties = Properties { shape_of, masses: &self.decoded.masses, inertias };
+        let properties = properties(accelerator, &self.decoded.masses);
         let passes = self.computed..pass + 1;
         self.decoded.batch.run(passes, &plan(arguments), properties, velocities);
         self.computed = pass + 1;

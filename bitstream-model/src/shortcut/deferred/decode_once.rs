@@ -12,7 +12,7 @@ use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
 use crate::accelerator::solver::Mass;
 use crate::config::BoardConfig;
 use crate::memory::{Memory, Source};
-use crate::shortcut::batch::{Batch, Translation};
+use crate::shortcut::batch::{Batch, Properties, Translation};
 use crate::stream::Stream;
 use crate::stream::span::Spans;
 use pgs_interface::record::Beat;
@@ -51,6 +51,8 @@ pub(super) struct Decoded {
     pub(super) batch: Batch,
     /// Mass properties of each shape.
     pub(super) masses: Vec<Mass>,
+    /// Whether each body has a shape of the table: without streamed masses.
+    pub(super) needs_shapes: bool,
     /// Where the beats of the decoded collisions are, stream by stream. [`Kind`] says it for the
     /// stream on which impulses come.
     origin: [Spans; STREAMS_MAX],
@@ -72,6 +74,7 @@ impl Decoded {
             translation: (!layout.in_place).then(|| Translation::new(layout)),
             batch: batch.of(layout.precision, layout.together).with_inertia(layout.inertia),
             masses: Vec::new(),
+            needs_shapes: true,
             origin: std::array::from_fn(|_| Spans::with_capacity(64)),
             first: Brings::Nothing,
             kinds: std::array::from_fn(|_| Kind::new()),
@@ -84,6 +87,7 @@ impl Decoded {
     pub(super) fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) {
         let collisions = arguments.collisions as usize;
         self.batch.begin(collisions, arguments.solver.pair_friction);
+        self.needs_shapes = !arguments.streamed_masses;
         self.masses.clear();
         self.masses.extend(shapes.iter().map(|shape| Mass {
             inverse_mass: shape.inverse_mass,
@@ -149,7 +153,7 @@ impl Decoded {
         &mut self,
         segment: &Segment,
         upcoming: &Upcoming<'_>,
-        shape_of: &[u8],
+        (shape_of, inverse_masses): (&[u8], &[f32]),
         memory: &Memory,
     ) {
         let (brings, total) = (self.first, segment.done + segment.left());
@@ -198,16 +202,14 @@ impl Decoded {
             }
             let records = (issues * self.together()).min(total - known);
             let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
-            let (shapes, masses) = (shape_of, &self.masses);
-            let batch = &mut self.batch;
+            let (batch, masses) = (&mut self.batch, &self.masses);
+            let properties = Properties { shape_of, masses, inverse_masses, inertias: &[] };
             let decoded = match &mut self.translation {
-                Some(translation) => {
-                    translation.decode(batch, streams, records, shapes, masses, sums)
-                }
+                Some(translation) => translation.decode(batch, streams, records, properties, sums),
                 None if brings == Brings::Nothing => {
-                    batch.decode(streams, records, shapes, masses, sums)
+                    batch.decode(streams, records, properties, sums)
                 }
-                None => batch.decode_warm(streams, records, shapes, masses, sums),
+                None => batch.decode_warm(streams, records, properties, sums),
             };
             self.refused = decoded.err();
             let decoded = self.batch.len() - known;

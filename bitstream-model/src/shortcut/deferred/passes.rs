@@ -92,7 +92,8 @@ impl Deferred {
         let Self { decoded, entered, .. } = self;
         let brings = Brings::of(&accelerator.arguments, pass);
         if pass == 0 {
-            decoded.decode_ahead(segment, upcoming, &accelerator.shape_of, memory);
+            let bodies = (&accelerator.shape_of[..], &accelerator.inverse_masses[..]);
+            decoded.decode_ahead(segment, upcoming, bodies, memory);
             let pipeline = &mut accelerator.pipeline;
             entered.distance_is(decoded.distance(), &decoded.batch, pipeline);
         } else if brings != decoded.first {

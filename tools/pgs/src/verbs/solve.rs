@@ -148,9 +148,7 @@ pub(crate) fn run(
         false => Vec::new(),
     };
     let mut opened = board::open(common, &args.build.build())?;
-    folder
-        .check_shapes(opened.accelerator.capabilities().shape_capacity)
-        .map_err(Failure::input)?;
+    folder.check_shapes(opened.accelerator.capabilities().shapes_max()).map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
     opened.inject(&args.planned, &parameters)?;
     let interrupt = Interrupt::install();

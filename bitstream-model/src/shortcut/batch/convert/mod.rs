@@ -5,13 +5,12 @@
 //! three and a half beats share a beat: the sum of all their words, padding included, counts for the
 //! first one.
 
-use super::Batch;
 use super::records::{BEATS, STREAMS};
+use super::{Batch, Properties};
 use crate::accelerator::records::array::{Row, half_of};
 use crate::accelerator::records::decode::{self, Collision};
 use crate::accelerator::records::segment::PacketError;
 use crate::accelerator::records::striping::STREAMS_MAX;
-use crate::accelerator::solver::Mass;
 use crate::cast::register;
 use crate::shortcut::deferred::eligible::Layout;
 use pgs_interface::number::StreamFormat;
@@ -66,8 +65,7 @@ impl Translation {
         batch: &mut Batch,
         streams: [&[Beat]; STREAMS_MAX],
         count: usize,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
         for (part, sums) in (0..).zip(sums[..count].chunks_mut(TOGETHER)) {
@@ -76,7 +74,7 @@ impl Translation {
             for ((to, from), beats) in translated.iter_mut().zip(&self.streams).zip(BEATS) {
                 *to = &from[..sums.len() * beats];
             }
-            let decoded = batch.decode(translated, sums.len(), shape_of, masses, sums);
+            let decoded = batch.decode(translated, sums.len(), properties, sums);
             sums.copy_from_slice(&self.sums[..sums.len()]);
             decoded?;
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::accelerator::records::array::beat_of;
+use crate::accelerator::solver::Mass;
 use crate::config::BoardConfig;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::Numbers;
@@ -81,8 +82,13 @@ fn what_is_taken_in_is_what_the_decoder_makes_of_each() {
             let masses = [0.0, 1.0].map(|mass| Mass { inverse_mass: mass, ..Mass::default() });
             batch.begin(count, false);
             let mut sums = vec![0; count];
-            let decoded =
-                translation.decode(&mut batch, streams, count, &shape_of, &masses, &mut sums);
+            let decoded = translation.decode(
+                &mut batch,
+                streams,
+                count,
+                Properties::of_shapes(&shape_of, &masses),
+                &mut sums,
+            );
             assert_eq!(decoded, Ok(()));
             assert_eq!(batch.len(), count);
             let mut left_out = [0; 5];
@@ -123,8 +129,13 @@ fn what_comes_before_a_refused_record_is_there() {
         batch.begin(records.len(), false);
         let mut sums = vec![0; records.len()];
         let shape_of = vec![1; BODIES as usize];
-        let found =
-            translation.decode(&mut batch, streams, records.len(), &shape_of, &masses, &mut sums);
+        let found = translation.decode(
+            &mut batch,
+            streams,
+            records.len(),
+            Properties::of_shapes(&shape_of, &masses),
+            &mut sums,
+        );
         let error = PacketError { code: ErrorCode::BodyIndex, channel: 0, beat: register(bad) };
         assert_eq!((found, batch.len()), (Err(error), bad));
         for (index, sum) in sums[..bad].iter().enumerate() {
@@ -191,7 +202,13 @@ fn pairs_are_taken_in_as_the_decoder_makes_them_and_what_pads_the_last_is_not() 
         let streams = dealt.each_ref().map(Vec::as_slice);
         let mut sums = vec![u32::MAX; count];
         batch.begin(count, false);
-        let decoded = translation.decode(&mut batch, streams, count, &shape_of, &masses, &mut sums);
+        let decoded = translation.decode(
+            &mut batch,
+            streams,
+            count,
+            Properties::of_shapes(&shape_of, &masses),
+            &mut sums,
+        );
         assert_eq!((decoded, batch.len()), (Ok(()), count));
         for (index, rows) in records[..count].iter().enumerate() {
             let expected = Collision::absolute(StreamFormat::Binary16, rows);
@@ -221,7 +238,13 @@ fn a_refused_record_ends_what_is_there_in_the_middle_of_a_pair_too() {
         let mut sums = vec![0; records.len()];
         batch.begin(records.len(), false);
         let (count, shapes) = (records.len(), &shape_of);
-        let found = translation.decode(&mut batch, streams, count, shapes, &masses, &mut sums);
+        let found = translation.decode(
+            &mut batch,
+            streams,
+            count,
+            Properties::of_shapes(shapes, &masses),
+            &mut sums,
+        );
         let error = PacketError { code: ErrorCode::ContactCount, channel: 0, beat: register(bad) };
         assert_eq!((found, batch.len()), (Err(error), bad));
     }

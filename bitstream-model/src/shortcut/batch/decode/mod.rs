@@ -14,9 +14,8 @@ use super::grouping::Places;
 use super::queue::Queue;
 use super::records::{Fill, Head, Records, sum};
 use super::width::Width;
-use super::{Batch, NO_SLOT};
+use super::{Batch, NO_SLOT, Properties};
 use crate::accelerator::records::segment::PacketError;
-use crate::accelerator::solver::Mass;
 use crate::cast::register;
 use pgs_interface::record::Beat;
 
@@ -196,12 +195,11 @@ impl Batch {
         &mut self,
         streams: [&[Beat]; 4],
         count: usize,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
         let records = Records { streams, warm: false, pair_friction: self.pair_friction };
-        self.decode_records(&records, count, shape_of, masses, sums)
+        self.decode_records(&records, count, properties, sums)
     }
 
     /// The same for records of a warm pass, of two beats on each stream: the impulses on the last one are
@@ -214,25 +212,23 @@ impl Batch {
         &mut self,
         streams: [&[Beat]; 4],
         count: usize,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
         let records = Records { streams, warm: true, pair_friction: self.pair_friction };
-        self.decode_records(&records, count, shape_of, masses, sums)
+        self.decode_records(&records, count, properties, sums)
     }
 
     fn decode_records(
         &mut self,
         records: &Records<'_>,
         count: usize,
-        shape_of: &[u8],
-        masses: &[Mass],
+        properties: Properties<'_>,
         sums: &mut [u32],
     ) -> Result<(), PacketError> {
-        let moves = |body: usize| masses[usize::from(shape_of[body])].inverse_mass != 0.0;
-        self.places.bodies(shape_of.len(), moves);
-        self.bodies = self.bodies.max(shape_of.len());
+        let bodies = properties.shape_of.len();
+        self.places.bodies(bodies, |body| properties.moves(body));
+        self.bodies = self.bodies.max(bodies);
         self.measured = false;
         self.spins = false;
         let mut at = 0;

@@ -102,7 +102,8 @@ impl Scene {
             }
             let streams = streams.each_ref().map(Vec::as_slice);
             let (count, sums) = (part.len(), &mut sums[part]);
-            result = batch.decode(streams, count, &self.shape_of, &MASSES, sums);
+            result =
+                batch.decode(streams, count, Properties::of_shapes(&self.shape_of, &MASSES), sums);
             if result.is_err() {
                 break;
             }

@@ -64,7 +64,7 @@ fn results(
     }
     let mut batch = Batch::with_width(threads, width);
     batch.begin(0, false);
-    let properties = Properties { shape_of: &shape_of, masses: &masses, inertias: &[] };
+    let properties = Properties::of_shapes(&shape_of, &masses);
     batch.enter(&velocities, properties);
     let mut places = [const { Vec::new() }; STREAMS_MAX];
     for (place, beats) in places.iter_mut().zip(beats_of_results(turns, bodies.clone())) {

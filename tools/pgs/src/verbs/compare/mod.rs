@@ -263,7 +263,7 @@ pub(crate) fn run(
 }
 
 fn board_shapes(opened: &crate::board::OpenBoard) -> u32 {
-    opened.accelerator.capabilities().shape_capacity
+    opened.accelerator.capabilities().shapes_max()
 }
 
 /// Does the same with both boards: in parallel, or one after the other where there is no second
