@@ -39,7 +39,7 @@ if [ $run_tests = yes ]; then
 		-p zynq-pgs -p bitstream-model --test it -- shortcuts shortcuts_buffers:: float_environment:: warm_start:: extensions::
 	# The C example with the static library; a build with a static C library has no shared one.
 	CC=aarch64-linux-gnu-gcc time_of attend timeout "${TEST_LIMIT:-1200}" \
-		cargo test --release --locked --target "$aarch64" -p zynq-pgs-c --test cube
+		cargo test --release --locked --target "$aarch64" -p zynq-pgs-c --test examples
 	# Bullet's bits from the binary itself, which no test has to be built for.
 	for folder in tests/golden/*/ ${PGS_VECTORS:+"$PGS_VECTORS"/*/}; do
 		[ -e "$folder/params.npy" ] || continue
