@@ -43,7 +43,7 @@ typedef enum zpgs_status {
     ZPGS_STATUS_REOPEN = 7,
     // `zpgs_cancel` ended the step. The board works, and the next step is not cancelled.
     ZPGS_STATUS_CANCELLED = 8,
-    // The call does not fit: a step is in flight, or none is.
+    // The call does not fit: a step is in flight, or none is; a list of collisions is open, or none is.
     ZPGS_STATUS_SEQUENCE = 9,
     // Another thread is in a call with the same accelerator.
     ZPGS_STATUS_BUSY = 10,
@@ -126,7 +126,7 @@ typedef struct zpgs_parameters {
     uint32_t deadline_ms;
     // Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     uint32_t retries;
-    // Flag: begin with the impulses of `zpgs_collisions`, in one more pass of each kind.
+    // Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each kind.
     uint32_t warm_start;
     // Flag: keep the impulses of the step for `zpgs_read_impulses`.
     uint32_t impulses_out;
@@ -403,6 +403,42 @@ enum zpgs_status zpgs_wait_and_start(struct zpgs_accelerator *accelerator,
 // # Safety
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
 enum zpgs_status zpgs_start(struct zpgs_accelerator *accelerator);
+
+// Begins a list of collisions in memory of the library, in place of an earlier one. `zpgs_push`
+// appends to it, and `zpgs_end` submits its step. A list may begin and grow while a step is in
+// flight.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
+enum zpgs_status zpgs_begin(struct zpgs_accelerator *accelerator);
+
+// Appends `count` collisions to the list, all or none. The arrays are the caller's again when the
+// call returns.
+//
+// A collision of count 0 keeps its place. `impulses` has the impulses that a step with `warm_start`
+// begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null if no step of the
+// list starts warm. `zpgs_end` checks the values of both.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions` is
+// null or the address of `count` collisions, and `impulses` is null or that of `count` impulses; no
+// thread writes them during the call.
+enum zpgs_status zpgs_push(struct zpgs_accelerator *accelerator,
+                           const struct zpgs_collision *collisions,
+                           const struct zpgs_impulses *impulses,
+                           size_t count);
+
+// Submits the step of the list, as `zpgs_submit`, and ends the list. The bodies are read now.
+// `zpgs_wait` ends the step.
+//
+// A list that has ended takes no more collisions. It stays until the next `zpgs_begin`, so that its
+// step can be submitted again, as after a fault. If the call fails the list is as before.
+//
+// # Safety
+// As `zpgs_step`.
+enum zpgs_status zpgs_end(struct zpgs_accelerator *accelerator,
+                          const struct zpgs_bodies *bodies,
+                          const struct zpgs_parameters *parameters);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -319,9 +319,20 @@ pub(crate) unsafe fn read_input<'a>(
     // SAFETY: as above.
     let collisions = unsafe { read_collisions(collisions) }?;
     // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this function.
-    let parameters = unsafe { memory::read(parameters, Parameters::default()) }?.driver()?;
+    let parameters = unsafe { read_parameters(parameters) }?;
     check_impulses(&collisions, &parameters)?;
     Ok((bodies, collisions, parameters))
+}
+
+/// Reads and checks the parameters of a step.
+///
+/// # Safety
+/// The pointer is null or leads to its structure, with the size in it.
+pub(crate) unsafe fn read_parameters(
+    pointer: *const Parameters,
+) -> Result<StepParameters, Failure> {
+    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this function.
+    unsafe { memory::read(pointer, Parameters::default()) }?.driver()
 }
 
 /// Reads and checks the caller's bodies.

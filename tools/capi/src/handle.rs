@@ -10,6 +10,7 @@ use zynq_pgs::{
 
 use crate::failure::Failure;
 use crate::last_error::c_string;
+use crate::pushed::{List, Pushed};
 use crate::status::Status;
 
 /// An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.
@@ -30,6 +31,7 @@ pub(crate) struct State {
     accelerator: Accelerator,
     ticket: Option<Detached>,
     prepared: Option<Prepared>,
+    pushed: Pushed,
 }
 
 impl AcceleratorHandle {
@@ -39,7 +41,8 @@ impl AcceleratorHandle {
         let mut accelerator = Accelerator::open(OpenOptions { board, ..OpenOptions::default() })?;
         let cancellation = Cancellation::new();
         accelerator.set_cancellation(cancellation.clone());
-        let state = Mutex::new(State { accelerator, ticket: None, prepared: None });
+        let (ticket, prepared, pushed) = (None, None, Pushed::default());
+        let state = Mutex::new(State { accelerator, ticket, prepared, pushed });
         Ok(Self { state, cancellation, text: Mutex::default() })
     }
 
@@ -96,6 +99,28 @@ impl State {
     ) -> Result<(), Failure> {
         let step = self.idle()?.submit(bodies, collisions, parameters)?;
         self.ticket = Some(step.detach());
+        Ok(())
+    }
+
+    /// The list of collisions that are pushed.
+    pub(crate) fn pushed(&mut self) -> &mut Pushed {
+        &mut self.pushed
+    }
+
+    /// Submits the step of the list, and ends the list.
+    pub(crate) fn submit_pushed(
+        &mut self,
+        bodies: &impl Bodies,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
+        self.idle()?;
+        let accelerator = &mut self.accelerator;
+        let step = match self.pushed.all(parameters.warm_start)? {
+            List::Cold(collisions) => accelerator.submit(bodies, collisions, parameters),
+            List::Warm(collisions) => accelerator.submit(bodies, &collisions, parameters),
+        }?;
+        self.ticket = Some(step.detach());
+        self.pushed.end();
         Ok(())
     }
 

@@ -97,7 +97,7 @@ pub struct Parameters {
     pub deadline_ms: u32,
     /// Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     pub retries: u32,
-    /// Flag: begin with the impulses of `zpgs_collisions`, in one more pass of each kind.
+    /// Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each kind.
     pub warm_start: u32,
     /// Flag: keep the impulses of the step for `zpgs_read_impulses`.
     pub impulses_out: u32,

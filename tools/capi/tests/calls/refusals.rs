@@ -1,0 +1,109 @@
+//! Wrong arguments and wrong input are refused by status and name, and change nothing.
+
+use std::ptr::{null, null_mut};
+
+use zynq_pgs_c::*;
+
+use crate::support::*;
+
+#[test]
+fn refused_input_is_named_with_its_cause_and_leaves_the_bodies() {
+    let (open, mut crates) = (Open::new("emulated:float"), world());
+    let all = [Collision { body_b: 5, ..collision() }];
+    assert_eq!(open.step(&arrays(&mut crates), &collisions(&all), &defaults()), Status::Input);
+    assert!(open.text().contains('5'), "{}", open.text());
+    let negative = Parameters { time_step: -1.0, ..defaults() };
+    let all = [collision()];
+    assert_eq!(open.step(&arrays(&mut crates), &collisions(&all), &negative), Status::Input);
+    assert_eq!(crates, world());
+    let shapes = [Shape { inverse_mass: f32::NAN, ..SHAPES[1] }];
+    assert_eq!(open.set_shapes(&shapes), Status::Input);
+    assert_eq!(open.step(&arrays(&mut crates), &collisions(&all), &defaults()), Status::Ok);
+}
+
+#[test]
+fn a_board_that_cannot_be_opened_is_a_status_a_text_and_a_null_handle() {
+    for (board, named) in
+        [(c"no such board", "no such board"), (c"emulated:fast", "fast"), (c"\xff", "UTF-8")]
+    {
+        let mut handle = std::ptr::dangling_mut();
+        let status = made!(zpgs_open(board.as_ptr(), &raw mut handle));
+        let expected = if named == "UTF-8" { Status::Argument } else { Status::Open };
+        assert_eq!((status, handle), (expected, null_mut()));
+        let text = text(made!(zpgs_last_error(null())));
+        assert!(text.contains(named), "{text}");
+    }
+}
+
+#[test]
+fn a_null_pointer_is_a_status_wherever_it_comes() {
+    let (open, mut crates, all) = (Open::new("emulated:float"), world(), [collision()]);
+    let (bodies, all, parameters) = (arrays(&mut crates), collisions(&all), defaults());
+    let (b, c, p) = (&raw const bodies, &raw const all, &raw const parameters);
+    let mut handle = null_mut();
+    let statuses = [
+        made!(zpgs_open(null(), &raw mut handle)),
+        made!(zpgs_open(c"emulated".as_ptr(), null_mut())),
+        made!(zpgs_set_shapes(null_mut(), SHAPES.as_ptr(), 2)),
+        made!(zpgs_set_shapes(open.0, null(), 2)),
+        made!(zpgs_parameters_default(null_mut(), size_of::<Parameters>())),
+        made!(zpgs_step(null_mut(), b, c, p, null_mut())),
+        made!(zpgs_step(open.0, null(), c, p, null_mut())),
+        made!(zpgs_step(open.0, b, null(), p, null_mut())),
+        made!(zpgs_step(open.0, b, c, null(), null_mut())),
+        made!(zpgs_submit(null_mut(), b, c, p)),
+        made!(zpgs_submit(open.0, null(), c, p)),
+        made!(zpgs_submit(open.0, b, null(), p)),
+        made!(zpgs_submit(open.0, b, c, null())),
+        made!(zpgs_wait(null_mut(), b, null_mut())),
+        made!(zpgs_wait(open.0, null(), null_mut())),
+        made!(zpgs_cancel(null())),
+    ];
+    assert_eq!(statuses, [Status::NullPointer; 16]);
+    assert_eq!(made!(zpgs_close(null_mut())), Status::Ok);
+    let mut positions = bodies;
+    positions.positions.data = null_mut();
+    assert_eq!(open.step(&positions, &all, &parameters), Status::NullPointer);
+    assert!(open.text().contains("positions"), "{}", open.text());
+    let mut nothing = all;
+    nothing.collisions.data = null();
+    assert_eq!(open.step(&bodies, &nothing, &parameters), Status::NullPointer);
+    nothing.count = 0;
+    assert_eq!(open.step(&bodies, &nothing, &parameters), Status::Ok, "no collision, no address");
+}
+
+#[test]
+fn an_array_that_is_misaligned_or_too_large_or_overlaps_itself_is_refused() {
+    let (open, mut crates, all) = (Open::new("emulated:float"), world(), [collision()]);
+    let (bodies, all, parameters) = (arrays(&mut crates), collisions(&all), defaults());
+    let refused = |bodies: &BodyArrays, all: &CollisionArray, named: &str| {
+        assert_eq!(open.step(bodies, all, &parameters), Status::Argument, "{named}");
+        assert!(open.text().contains(named), "{}: {named}", open.text());
+    };
+    let mut odd = bodies;
+    odd.orientations.data = odd.orientations.data.wrapping_byte_add(1);
+    refused(&odd, &all, "orientations");
+    for stride in [0, 8, 13] {
+        let mut close = bodies;
+        close.linear_velocities.stride = stride;
+        refused(&close, &all, "linear velocities");
+    }
+    let mut wide = bodies;
+    wide.angular_velocities.stride = usize::MAX - 3;
+    refused(&wide, &all, "angular velocities");
+    let mut many = all;
+    many.count = usize::MAX;
+    refused(&bodies, &many, "collisions");
+    assert_eq!(made!(zpgs_set_shapes(open.0, SHAPES.as_ptr(), usize::MAX)), Status::Argument);
+    refused(&BodyArrays { size: 3, ..bodies }, &all, "sizeof(zpgs_bodies)");
+    let mut report = Report::default();
+    let status = made!(zpgs_step(
+        open.0,
+        &raw const bodies,
+        &raw const all,
+        &raw const parameters,
+        &raw mut report
+    ));
+    assert_eq!(status, Status::Argument, "a report without a size");
+    assert_eq!(crates, world());
+}
