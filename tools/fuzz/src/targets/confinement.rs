@@ -40,6 +40,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         if number == 0 || input.one_in(4) {
             let most = if input.one_in(64) { 40 } else { 8 };
             scene = Scene::any(&mut input, most, most, InvalidValues::Sometimes);
+            scene.outgrow(&mut input, accelerator.capabilities().extensions);
             if accelerator.set_shapes(&scene.shapes).is_err() {
                 tally.refused += 1;
                 // Isotropic, which every board takes.

@@ -171,8 +171,9 @@ impl Run {
             // Such a step does not reach the board.
             return None;
         }
-        accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
         let extensions = accelerator.capabilities().extensions;
+        scene.outgrow(input, extensions);
+        accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
         let mut parameters = parameters(input, 3, InvalidValues::Never, extensions);
         scene.suit(input, &parameters, InvalidValues::Never);
         // With hazards, the result of a pipeline that does not wait depends on the arrival of

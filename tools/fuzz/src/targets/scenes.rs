@@ -71,6 +71,14 @@ impl Scene {
         Self { shapes, bodies, collisions, impulses }
     }
 
+    /// Sometimes has more shapes than the table of a board that can do without: masses are then streamed.
+    pub(super) fn outgrow(&mut self, input: &mut Input<'_>, extensions: Extensions) {
+        if extensions.streamed_masses && input.one_in(4) {
+            let last = self.shapes[self.shapes.len() - 1];
+            self.shapes.resize(70, last);
+        }
+    }
+
     /// The collisions, with the impulses that they begin with.
     pub(super) fn given(&self) -> WarmCollisions<'_, [Collision]> {
         WarmCollisions { collisions: &self.collisions, impulses: &self.impulses }

@@ -136,12 +136,42 @@ fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
 #[test]
 fn shapes_have_a_friction_for_each_pair_and_cubes_have_one() {
     let shapes = "--scene shapes --inertia world --grid 3x3x3 --steps 60";
-    let (one, own) = (document(shapes), document(&format!("{shapes} --pair-friction")));
+    let (one, own) = (document(&format!("{shapes} --pair-friction=false")), document(shapes));
     assert_ne!(one["digest"], own["digest"]);
     assert_eq!(own["config"]["pair_friction"], true);
     let refused = run("run --grid 2x2x2 --pair-friction".split(' '));
     assert_eq!(refused.code, Some(2), "{}", refused.stderr);
     assert!(refused.stderr.contains("--scene shapes"), "{}", refused.stderr);
+}
+
+/// The shapes need no option: world inertia, a warm start and the frictions are the scene's.
+#[test]
+fn shapes_are_stepped_warm_beside_the_same_ones_cold() {
+    let of = |options: &str| document(&format!("--scene shapes --grid 3x3x3 {options}"));
+    let found = of("--steps 120");
+    assert_eq!(found["board"]["design"], "float,world");
+    assert_eq!(
+        (&found["config"]["warm_start"], &found["config"]["pair_friction"]),
+        (&true.into(), &true.into())
+    );
+    let depth = |of: &Value| of["deepest_penetration_m"].as_f64().expect("a number");
+    let (warm, cold) = (&found["steps"][119], &found["steps"][119]["beside_cold"]);
+    assert_ne!(depth(warm), depth(cold));
+    // The scene beside it is the one that a run without both steps.
+    let alone = of("--steps 120 --warm-start=false --pair-friction=false");
+    assert_eq!(depth(cold), depth(&alone["steps"][119]));
+    assert_eq!(alone["beside_cold"], Value::Null);
+    let table = ran("--scene shapes --grid 2x2x2 --steps 3").stdout;
+    assert!(table.contains("cold mm") && fact(&table, "cold").contains("one friction"), "{table}");
+}
+
+/// A design without a warm start steps the shapes cold, unless it is asked for one.
+#[test]
+fn shapes_are_cold_where_the_design_has_no_warm_start() {
+    let options = "--scene shapes --grid 2x2x2 --steps 2 --profile mixed";
+    assert_eq!(document(options)["config"]["warm_start"], false);
+    let refused = run(format!("run {options} --warm-start").split(' '));
+    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
 }
 
 #[test]

@@ -93,7 +93,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
-    /// deep its bodies sink and how much they move [default: of the shapes with a warm start]
+    /// deep its bodies sink and how much they move [default: of the shapes with a warm start, if no
+    /// fault is planned]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     beside_cold: Option<bool>,
     #[command(flatten)]
@@ -136,10 +137,11 @@ impl RunArgs {
         self.steps.unwrap_or(if self.scene.is_cubes() { cubes } else { shapes })
     }
 
-    /// The scene that is stepped beside this one, if one is.
+    /// The scene that is stepped beside this one, if one is. A planned fault counts the steps of the board,
+    /// which should then be those of the run.
     fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
-        let shapes = !self.scene.is_cubes();
-        let wanted = self.beside_cold.unwrap_or(shapes && parameters.warm_start);
+        let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
+        let wanted = self.beside_cold.unwrap_or(shown);
         let scene = || self.scene.build(&self.build.build());
         wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
     }
