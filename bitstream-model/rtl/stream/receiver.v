@@ -33,7 +33,7 @@ module receiver #(
   output wire [5:0]   count,            // beats in the FIFO
   output wire         there,            // count > 0
   input  wire         pop,
-  output wire         collision_begins, // `tdata` is the stream's first beat of a collision
+  output wire         collision_begins, // `tdata` is the first beat of a collision on stream 0, 1 or 2
 
   output wire [31:0]  sum,
   output reg          error,
@@ -70,7 +70,6 @@ module receiver #(
   reg        open;           // segment != FINISHED
   reg [9:0]  passes_left;
   reg        pass_is_last;
-  reg        pass_is_warm;   // of the pass that comes next, while none is under way
   reg [20:0] left;           // beats of the packet that have not come
   reg        beat_is_last;   // left == 1
   reg [20:0] beat;           // number of the next beat in its packet
@@ -79,7 +78,6 @@ module receiver #(
   wire has_room;
   wire accepted = tvalid & tready;
   wire in_pass  = segment == PASSES;
-  wire two      = (CHANNEL != 3) | pass_is_warm;    // beats of a collision
   assign tready           = open & has_room;
   assign collision_begins = accepted & in_pass & ~second;
 
@@ -90,7 +88,7 @@ module receiver #(
                            : (in_pass & ~pass_is_last) ? PASSES
                            : in_pass ? after_passes : FINISHED;
   wire [1:0] first_segment = body_beats_none ? after_load : VELOCITIES;
-  wire       next_is_warm  = in_pass ? warm_start & (passes_left == before_friction) : pass_is_warm;
+  wire       next_is_warm  = warm_start & (~in_pass | (passes_left == before_friction));
 
   task begin_packet(input [1:0] of, input warm);
     begin
@@ -112,18 +110,16 @@ module receiver #(
       begin_packet(first_segment, warm_start);
       passes_left  <= passes;
       pass_is_last <= passes_one;
-      pass_is_warm <= warm_start;
     end else if (accepted) begin
       if (beat_is_last) begin
         begin_packet(next_segment, next_is_warm);
         if (in_pass) begin
           passes_left  <= passes_left - 10'd1;
           pass_is_last <= passes_left == 10'd2;
-          pass_is_warm <= next_is_warm;
         end
       end else begin
         beat         <= beat + 21'd1;
-        second       <= two & ~second;
+        second       <= ~second;
         left         <= left - 21'd1;
         beat_is_last <= left == 21'd2;
       end

@@ -144,10 +144,10 @@ pub const MUTATIONS: &[Mutation] = &[
         wrong: "there[3]",
     },
     Mutation {
-        name: "the second pass on stream 3 is as long as a warm one",
+        name: "every pass on stream 3 is as long as a warm one",
         file: "receiver.v",
-        right: "pass_is_warm <= next_is_warm;",
-        wrong: "pass_is_warm <= pass_is_warm;",
+        right: "begin_packet(next_segment, next_is_warm);",
+        wrong: "begin_packet(next_segment, warm_start);",
     },
 ];
 

@@ -133,7 +133,7 @@ impl Draw {
         [0, 1]
     }
 
-    /// Impulses for each collision, those of unused points anything; a fault in any packet.
+    /// Impulses for each collision, with any words for unused points; a fault in any packet.
     fn warm(&mut self, case: &mut Case) {
         let scene = &mut case.scene;
         scene.arguments.warm_start = true;

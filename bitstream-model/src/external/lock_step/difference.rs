@@ -140,8 +140,8 @@ fn first_word(model: &StreamBeat, hardware: &StreamBeat) -> Option<(usize, [u32;
     words.map(|(word, (m, h))| (word, [m, h])).find(|(_, [m, h])| !same_number(*m, *h))
 }
 
-/// The first difference between the beats number `at` of a stream out, of which the first `impulses` on
-/// the stream of the impulses are no results.
+/// The first difference between the beats number `at` of a stream out. The stream of the impulses has
+/// `impulses` beats of them in front of its results.
 pub(super) fn first_difference(
     config: &BoardConfig,
     stream: usize,
