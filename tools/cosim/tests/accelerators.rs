@@ -132,7 +132,7 @@ fn the_driver_steps_warm_on_an_accelerator_in_another_process() {
         let mut accelerator = Accelerator::open(options).expect("open");
         accelerator.set_shapes(&folder.shapes).expect("shapes");
         let mut bodies = folder.bodies.clone();
-        let parameters = folder.parameters.clone().with_impulses_out(true);
+        let parameters = folder.parameters.with_impulses_out(true);
         accelerator.step(&mut bodies, &folder.collisions, &parameters).expect("a cold step");
         let impulses = accelerator.impulses().to_vec();
         assert!(impulses.iter().any(|impulses| *impulses != Impulses::ZERO));
