@@ -23,6 +23,8 @@ module core (
   input  wire         integrate,
   input  wire         kinematic,
   input  wire         pair_friction,
+  input  wire         warm_start,
+  input  wire         impulses_out,
   input  wire [31:0]  time_step,
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
@@ -70,20 +72,26 @@ module core (
   localparam COLLISION      = COLLISION_BITS;  // bits of a collision's number
   localparam SHAPE          = 6;               // bits of a shape's number
 
-  // Passes of the step; without collisions there are none.
-  reg [8:0] contact_passes, friction_passes, passes;
+  // Passes of the step: a kind that has any has a warm one more. Without collisions there are none.
+  wire      takes_impulses = warm_start & (DESIGN_WARM_START != 0);
+  wire      gives_impulses = impulses_out & (DESIGN_WARM_START != 0);
+  reg [8:0] contact_passes, friction_passes;
+  reg [9:0] passes;
   reg       no_contacts;
   always @(posedge clk) begin
     no_contacts     <= contact_passes == 9'd0;
-    contact_passes  <= (collisions == 20'd0) ? 9'd0 : {1'b0, contact_iterations};
-    friction_passes <= (collisions == 20'd0) ? 9'd0 : {1'b0, friction_iterations};
-    passes          <= contact_passes + friction_passes;
+    contact_passes  <= (collisions == 20'd0) ? 9'd0
+                     : {1'b0, contact_iterations} + {8'd0, takes_impulses & |contact_iterations};
+    friction_passes <= (collisions == 20'd0) ? 9'd0
+                     : {1'b0, friction_iterations} + {8'd0, takes_impulses & |friction_iterations};
+    passes          <= {1'b0, contact_passes} + {1'b0, friction_passes};
   end
 
   // ---- Sequence
 
   wire phase, slot_begins, loading, finding, passing, draining, begin_pass, integrating;
   wire friction, first_of_kind, last_contact, parity;
+  wire warm, next_warm, sends, next_sends;
   wire [1:0] loads, load_finished;
   wire issues, stalls, waits, enters, enter_finished;
   wire [3:0] sender_finished;
@@ -93,12 +101,14 @@ module core (
   ) steps (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
+    .warm_start(takes_impulses), .impulses_out(gives_impulses),
     .loads(|loads), .load_finished(&load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
     .busy(busy), .done(done), .phase(phase), .slot_begins(slot_begins), .loading(loading), .finding(finding), .passing(passing),
     .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
     .friction(friction), .first_of_kind(first_of_kind), .last_contact(last_contact), .parity(parity),
+    .warm(warm), .next_warm(next_warm), .sends(sends), .next_sends(next_sends),
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
   );
 
@@ -121,13 +131,14 @@ module core (
   wire [20:0]  wrong_beat [0:3];
   wire [7:0]   wrong_code [0:3];
   wire [3:0]   pop, wrong, collision_begins;
-  wire         unused = &{1'b0, collision_begins[3], count[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
+  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
       receiver #(.CHANNEL(k)) stream (
         .clk(clk), .stop(reset | error), .start(start), .clear(clear),
-        .bodies(bodies), .collisions(collisions), .passes(passes),
+        .bodies(bodies), .collisions(collisions),
+        .passes(passes), .friction_passes(friction_passes), .warm_start(takes_impulses),
         .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
         .tvalid(s_tvalid[k]), .tready(s_tready[k]),
         .head(head[k]), .count(count[k]), .there(there[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),
@@ -204,29 +215,30 @@ module core (
     .error(find_error), .error_code(find_error_code), .error_collision(find_error_collision)
   );
 
+  wire [3:0] room;                     // for a row of each stream out
   // In the cycle before an issue the second beats of the collision before may still be in the FIFOs.
   reg  second;                         // the second beats are taken in this cycle
   wire [5:0] beats_needed = second ? 6'd3 : 6'd2;
   wire beats_there = (count[0] >= beats_needed) & (count[1] >= beats_needed) & (count[2] >= beats_needed)
-                   & there[3];
+                   & (next_warm ? count[3] >= beats_needed : there[3]);
   issue #(
     .COLLISION(COLLISION), .INTERLOCKED(DESIGN_INTERLOCKED),
     .CONTACT_WINDOW(CONTACT_WINDOW), .FRICTION_WINDOW(FRICTION_WINDOW)
   ) issuer (
     .clk(clk), .clear(clear), .phase(phase), .passing(passing), .draining(draining),
-    .friction(friction), .parity(parity), .beats_there(beats_there), .found(found),
+    .friction(friction), .parity(parity), .streams_ready(beats_there & (room[0] | ~next_sends)), .found(found),
     .last_use_a(last_use_a), .last_use_b(last_use_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
     .issues(issues), .stalls(stalls), .waits(waits), .hazards(hazards)
   );
 
   // Each of these is there in its own part of the step only.
-  assign pop = {{2{loads[1] | pop_odd}}, {2{loads[0] | pop_even}}} | {issues, {3{issues | second}}};
+  assign pop = {{2{loads[1] | pop_odd}}, {2{loads[0] | pop_even}}} | {issues | (second & warm), {3{issues | second}}};
 
-  // The seven beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
+  // The beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
   // pipeline is the first of them. The first of both registers takes whatever is there in a slot, and
-  // `second` tells whether that is a collision.
+  // `second` tells whether that is a collision. Row 7, the given impulses, means something in a warm pass alone.
   reg  [511:0]    early;               // rows 0 to 3
-  reg  [895:0]    rows;                // rows 0 to 6
+  reg  [1023:0]   rows;                // rows 0 to 7
   reg             valid;
   reg  [BODY-1:0] early_a, early_b, body_a, body_b;
   reg             early_moves_a, early_moves_b, moves_a, moves_b;
@@ -244,7 +256,7 @@ module core (
     end
     if (phase) begin
       valid <= second & ~clear;
-      rows  <= {head[2], head[1], head[0], early};
+      rows  <= {head[3], head[2], head[1], head[0], early};
       friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
@@ -335,6 +347,7 @@ module core (
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
   ) accumulated (
     .clk(clk), .begin_pass(clear | begin_pass), .friction(friction), .first_of_kind(first_of_kind),
+    .warm(warm), .give(warm & valid & phase), .given(rows[1023:896]),
     .last_contact(last_contact), .no_contacts(no_contacts), .read(reads_impulse),
     .impulse0(impulse0), .impulse1(impulse1), .impulse2(impulse2), .impulse3(impulse3),
     .write(ends), .contact_impulses(contact_impulses), .contact_total(contact_total),
@@ -348,7 +361,7 @@ module core (
   // ---- Pipelines
 
   contact contact_pipeline (
-    .clk(clk), .phase({phase, slot_begins}),
+    .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
     .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
     .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
@@ -366,7 +379,7 @@ module core (
     .out_linear_b(contact_velocity_b[95:0]), .out_angular_b(contact_velocity_b[191:96])
   );
   friction friction_pipeline (
-    .clk(clk), .phase({phase, slot_begins}),
+    .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
     .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
     .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
@@ -384,7 +397,6 @@ module core (
 
   // ---- Integration and streams out
 
-  wire [3:0]   room;
   wire         pop_even, pop_odd;
   wire         body_valid, body_free;
   wire [31:0]  body_damping;
@@ -417,7 +429,14 @@ module core (
   );
   wire [127:0] result [0:3];
   wire [31:0]  sent [0:3];
-  assign result[0] = {32'd0, new_position};
+  // After the last pass of a kind the impulses of each collision, in front of the results.
+  reg          impulse_valid;
+  reg  [127:0] impulse_row;
+  always @(posedge clk) begin
+    impulse_valid <= ends & sends & ~clear;
+    impulse_row   <= friction ? {64'd0, friction_impulses} : contact_impulses;
+  end
+  assign result[0] = impulse_valid ? impulse_row : {32'd0, new_position};
   assign result[1] = new_orientation;
   assign result[2] = {32'd0, new_linear};
   assign result[3] = {32'd0, new_angular};
@@ -425,7 +444,8 @@ module core (
     for (k = 0; k < 4; k = k + 1) begin : g_sender
       sender #(.ADDRESS(10)) stream (
         .clk(clk), .clear(clear), .stop(error), .bodies(bodies),
-        .enters(enters), .has_room(room[k]), .push(result_valid), .row(result[k]),
+        .enters(enters | ((k == 0) & issues & sends)), .has_room(room[k]),
+        .push(result_valid | ((k == 0) & impulse_valid)), .result(result_valid), .row(result[k]),
         .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),
         .finished(sender_finished[k]), .sum(sent[k])
       );

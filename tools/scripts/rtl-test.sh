@@ -76,10 +76,15 @@ for hazards in interlocked unchecked; do
 	cosim=(--simulator "$folder/$hazards/pgs-rtl" --hazards "$hazards")
 	attend "$built/cosim" recorded "${cosim[@]}" "${recorded[@]}"
 	attend "$built/cosim" errors "${cosim[@]}"
+	attend "$built/cosim" full "${cosim[@]}"
 	attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
 done
 # Without the interlock the bits depend on the time at which beats come.
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
 	--gaps 300 --stalls 700
+attend "$built/cosim" full --simulator "$folder/interlocked/pgs-rtl" --gaps 300 --stalls 700
 attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated --subnormals flush \
+	--accelerator "both:${simulators[0]}"
+# Impulses of each step come out, and go into the next one.
+attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated --subnormals flush \
 	--accelerator "both:${simulators[0]}"

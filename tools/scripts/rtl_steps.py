@@ -74,12 +74,12 @@ def main():
                 failed += bool(wrong)
                 result = f"differs from {model}: {', '.join(wrong)}" if wrong else "the model's"
                 print(f"{folder} {hazards} {bandwidth}: {hardware}: {result}", flush=True)
-    for order in ("as-given", "auto"):
-        verb = ["run", "--grid", "5x5x5", "--steps", "60", "--order", order]
+    for options in (["--order", "as-given"], ["--order", "auto"], ["--order", "auto", "--warm-start"]):
+        verb = ["run", "--grid", "5x5x5", "--steps", "60", *options]
         model = pgs(program, verb, "--accelerator", "model")[0]["digest"]["value"]
         hardware = pgs(program, verb, "--accelerator", f"rtl:{interlocked}")[0]["digest"]["value"]
         failed += model != hardware
-        print(f"run --grid 5x5x5 --steps 60 --order {order}: {hardware}, model {model}", flush=True)
+        print(f"{' '.join(verb)}: {hardware}, model {model}", flush=True)
     return 1 if failed else 0
 
 

@@ -1,5 +1,6 @@
 // Issues collisions into a pass: one in every second cycle, in the order of the records, as soon as
-// its beats are there and, interlocked, no collision under way writes one of its bodies.
+// its beats are there, with room for its impulses in a pass that sends them, and, interlocked, no
+// collision under way writes one of its bodies.
 //
 // A collision is under way until it is *retired*: its write-back can then be read. Because all
 // collisions of a pass take the same time, a count of the retired ones tells of each whether it is.
@@ -19,7 +20,7 @@ module issue #(
   input  wire                 friction,
   input  wire                 parity,          // of the pass
 
-  input  wire                 beats_there,     // all beats of the next collision
+  input  wire                 streams_ready,   // all beats of the next collision, and room for its impulses
   input  wire                 found,
   input  wire [COLLISION:0]   last_use_a,
   input  wire [COLLISION:0]   last_use_b,
@@ -40,7 +41,7 @@ module issue #(
   // Compared in the cycle before the issue, in which neither side changes. That cycle has phase 1, and
   // tells of the next one, too, that a collision can be issued in it.
   reg  hazard, slot_there, slot_missing;
-  wire there = beats_there & found;
+  wire there = streams_ready & found;
   wire hazard_a = moves_a & (last_use_a[COLLISION] == parity) & (last_use_a[COLLISION-1:0] >= retired);
   wire hazard_b = moves_b & (last_use_b[COLLISION] == parity) & (last_use_b[COLLISION-1:0] >= retired);
   always @(posedge clk) begin

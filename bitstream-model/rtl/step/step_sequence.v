@@ -23,8 +23,10 @@ module step_sequence #(
   input  wire        start,
   input  wire        error,
   input  wire [19:0] collisions,
-  input  wire [8:0]  contact_passes,    // 0 without collisions
+  input  wire [8:0]  contact_passes,    // with the warm one; 0 without collisions
   input  wire [8:0]  friction_passes,
+  input  wire        warm_start,        // the first pass of each kind is a warm one
+  input  wire        impulses_out,      // the last pass of each kind sends the impulses
 
   input  wire        loads,             // a pair of bodies is taken
   input  wire        load_finished,
@@ -48,6 +50,10 @@ module step_sequence #(
   output reg         friction,          // the kind of the pass
   output reg         first_of_kind,
   output reg         last_contact,
+  output reg         warm,              // the pass takes the given impulses
+  output reg         next_warm,         // the same; of the next pass while one drains
+  output reg         sends,             // the pass sends its impulses
+  output reg         next_sends,        // the same; of the next pass while one drains
   output reg         parity,            // of the pass; of the next one while it drains
 
   output reg  [63:0] cycles,
@@ -77,7 +83,7 @@ module step_sequence #(
   reg [8:0]  contacts_left, frictions_left;
   reg        pass_is_last;              // no pass follows this one
   reg        no_passes;
-  reg        no_contacts, one_contact, no_frictions, one_collision;   // settled before a start
+  reg        no_contacts, one_contact, no_frictions, one_friction, one_collision;   // settled before a start
   reg [9:0]  leave;
   reg        leave_over;
   reg [2:0]  settle;
@@ -93,12 +99,16 @@ module step_sequence #(
 
   // Counts of the passes, as they are when the next one begins.
   wire last_of_kind = friction ? frictions_left == 9'd1 : contacts_left == 9'd1;
+  wire kind_changes = ~friction & last_of_kind;
+  wire next_is_last = kind_changes ? frictions_left == 9'd1
+                    : friction ? frictions_left == 9'd2 : contacts_left == 9'd2;
 
   always @(posedge clk) begin
     done <= 1'b0;
     no_contacts   <= contact_passes == 9'd0;
     one_contact   <= contact_passes == 9'd1;
     no_frictions  <= friction_passes == 9'd0;
+    one_friction  <= friction_passes == 9'd1;
     one_collision <= collisions == 20'd1;
     // The phase runs from the setup on, so that every step has the same.
     phase       <= (state == IDLE | state == LOAD) ? 1'b0 : ~phase;
@@ -120,6 +130,8 @@ module step_sequence #(
       friction       <= no_contacts;
       last_contact   <= one_contact;
       first_of_kind  <= 1'b1;
+      {warm, next_warm}   <= {2{warm_start}};
+      {sends, next_sends} <= {2{impulses_out & (no_contacts ? one_friction : one_contact)}};
       parity         <= 1'b0;
       leave          <= FINISH[9:0];
       leave_over     <= 1'b0;
@@ -161,11 +173,15 @@ module step_sequence #(
           drain_one <= drain == 10'd1;
           left      <= collisions;
           left_one  <= one_collision;
+          next_warm  <= warm_start & kind_changes;
+          next_sends <= impulses_out & next_is_last;
           if (drain_one) begin
             finding       <= ~pass_is_last;
             state         <= pass_is_last ? ENTER : PASS;
             passing       <= ~pass_is_last;
-            first_of_kind <= ~friction & last_of_kind;
+            first_of_kind <= kind_changes;
+            warm          <= next_warm;
+            sends         <= next_sends;
             if (friction) frictions_left <= frictions_left - 9'd1;
             else contacts_left <= contacts_left - 9'd1;
             friction      <= friction | last_of_kind;

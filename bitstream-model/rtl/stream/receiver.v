@@ -3,8 +3,8 @@
 //
 // A step has a packet of velocities, one of collisions in every pass, and one of poses. Beats of a
 // body are dealt to the four streams in turn, two a body; of the seven beats of a collision streams
-// 0, 1 and 2 carry two and stream 3 one (specification, sections 2 and 3). A packet without a beat
-// does not exist.
+// 0, 1 and 2 carry two and stream 3 one, and in a warm pass stream 3 carries a second one, its impulses
+// (specification, sections 2 and 3). A packet without a beat does not exist.
 //
 // All lengths are registered before `start`, and the end of a packet is a flag that a down-counter
 // prepares: no comparison of lengths lies on the way of a beat.
@@ -19,7 +19,9 @@ module receiver #(
   input  wire         clear,            // reset or start
   input  wire [19:0]  bodies,
   input  wire [19:0]  collisions,
-  input  wire [8:0]   passes,           // 0 without collisions
+  input  wire [9:0]   passes,           // 0 without collisions
+  input  wire [8:0]   friction_passes,
+  input  wire         warm_start,       // the first pass of each kind is a warm one
 
   input  wire [127:0] tdata,
   input  wire [15:0]  tkeep,
@@ -31,7 +33,7 @@ module receiver #(
   output wire [5:0]   count,            // beats in the FIFO
   output wire         there,            // count > 0
   input  wire         pop,
-  output wire         collision_begins, // `tdata` is the stream's first beat of a collision
+  output wire         collision_begins, // `tdata` is the first beat of a collision on stream 0, 1 or 2
 
   output wire [31:0]  sum,
   output reg          error,
@@ -50,6 +52,7 @@ module receiver #(
   localparam [20:0] BODY_OFFSET = 21'd3 - CHANNEL;
   reg [20:0] body_beats, pass_beats;
   reg        body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
+  reg [9:0]  before_friction;    // passes left when the last contact pass is under way
   wire [20:0] body_beats_next = ({bodies, 1'b0} + BODY_OFFSET) >> 2;
   wire [20:0] pass_beats_next = (CHANNEL == 3) ? {1'b0, collisions} : {collisions, 1'b0};
   always @(posedge clk) begin
@@ -58,13 +61,14 @@ module receiver #(
     body_beats_none <= body_beats_next == 21'd0;
     body_beats_one  <= body_beats_next == 21'd1;
     pass_beats_one  <= pass_beats_next == 21'd1;
-    passes_none     <= passes == 9'd0;
-    passes_one      <= passes == 9'd1;
+    passes_none     <= passes == 10'd0;
+    passes_one      <= passes == 10'd1;
+    before_friction <= {1'b0, friction_passes} + 10'd1;
   end
 
   reg [1:0]  segment;
   reg        open;           // segment != FINISHED
-  reg [8:0]  passes_left;
+  reg [9:0]  passes_left;
   reg        pass_is_last;
   reg [20:0] left;           // beats of the packet that have not come
   reg        beat_is_last;   // left == 1
@@ -84,15 +88,16 @@ module receiver #(
                            : (in_pass & ~pass_is_last) ? PASSES
                            : in_pass ? after_passes : FINISHED;
   wire [1:0] first_segment = body_beats_none ? after_load : VELOCITIES;
+  wire       next_is_warm  = warm_start & (~in_pass | (passes_left == before_friction));
 
-  task begin_packet(input [1:0] of);
+  task begin_packet(input [1:0] of, input warm);
     begin
       segment      <= of;
       open         <= of != FINISHED;
       beat         <= 21'd0;
       second       <= 1'b0;
-      left         <= (of == PASSES) ? pass_beats : body_beats;
-      beat_is_last <= (of == PASSES) ? pass_beats_one : body_beats_one;
+      left         <= (of != PASSES) ? body_beats : ((CHANNEL == 3) & warm) ? {collisions, 1'b0} : pass_beats;
+      beat_is_last <= (of != PASSES) ? body_beats_one : pass_beats_one & ~((CHANNEL == 3) & warm);
     end
   endtask
 
@@ -102,19 +107,19 @@ module receiver #(
       segment <= FINISHED;
       open    <= 1'b0;
     end else if (start) begin
-      begin_packet(first_segment);
+      begin_packet(first_segment, warm_start);
       passes_left  <= passes;
       pass_is_last <= passes_one;
     end else if (accepted) begin
       if (beat_is_last) begin
-        begin_packet(next_segment);
+        begin_packet(next_segment, next_is_warm);
         if (in_pass) begin
-          passes_left  <= passes_left - 9'd1;
-          pass_is_last <= passes_left == 9'd2;
+          passes_left  <= passes_left - 10'd1;
+          pass_is_last <= passes_left == 10'd2;
         end
       end else begin
         beat         <= beat + 21'd1;
-        second       <= (CHANNEL == 3) ? 1'b0 : ~second;
+        second       <= ~second;
         left         <= left - 21'd1;
         beat_is_last <= left == 21'd2;
       end

@@ -1,8 +1,9 @@
 // One stream out of the accelerator: a FIFO for the rows of the results, TLAST with the last one, and
-// the credits that keep the FIFO from running over.
+// the credits that keep the FIFO from running over. On stream 0 impulses of collisions go in front of the
+// results, in the same packet.
 //
-// A body that enters the integration takes a credit of every sender, long before its row arrives. A
-// beat that leaves gives it back.
+// A body that enters the integration takes a credit of every sender, and a collision whose impulses go out
+// one of sender 0, long before its row arrives. A beat that leaves gives it back.
 `default_nettype none
 
 module sender #(
@@ -13,9 +14,10 @@ module sender #(
   input  wire         stop,     // the step has an error: no more rows leave
   input  wire [19:0]  bodies,
 
-  input  wire         enters,   // a body enters the integration
-  output reg          has_room, // a body may enter in the next cycle
+  input  wire         enters,   // a body enters the integration, or a collision its last pass
+  output reg          has_room, // one may enter in the next cycle
   input  wire         push,
+  input  wire         result,   // the row is one of a result
   input  wire [127:0] row,
 
   output wire [127:0] tdata,
@@ -29,42 +31,38 @@ module sender #(
   localparam [ADDRESS:0] CREDITS = (1 << ADDRESS) - 4;
 
   reg [ADDRESS:0]  credits;
-  reg [19:0]       rows_left, beats_left;
-  reg              row_is_last, beat_is_last, one_row;
+  reg [19:0]       rows_left;        // of the results
+  reg              row_is_last, one_row;
   reg              taken, given;     // a credit, in the cycle before; a beat gives one as it leaves
+  reg              last_left;        // the beat in the cycle before was the last one
   wire             leaves = tvalid & tready;
 
   always @(posedge clk) begin
     one_row <= bodies == 20'd1;
     taken   <= enters & ~clear;
     given   <= leaves & ~clear;
+    last_left <= leaves & tlast & ~clear;
     if (clear) begin
       credits      <= CREDITS;
       has_room     <= 1'b1;
       rows_left    <= bodies;
       row_is_last  <= one_row;
-      beats_left   <= bodies;
-      beat_is_last <= one_row;
       finished     <= 1'b0;
     end else begin
       if (taken & ~given) credits <= credits - 1'b1;
       if (given & ~taken) credits <= credits + 1'b1;
       // Two bodies may enter before this flag tells of them.
       has_room <= credits > 3;
-      if (push) begin
+      if (push & result) begin
         rows_left   <= rows_left - 20'd1;
         row_is_last <= rows_left == 20'd2;
       end
-      if (given) begin
-        beats_left   <= beats_left - 20'd1;
-        beat_is_last <= beats_left == 20'd2;
-        finished     <= beat_is_last;
-      end
+      if (last_left) finished <= 1'b1;
     end
   end
 
   block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
-    .clk(clk), .clear(clear | stop), .push(push), .in({row_is_last, row}), .pop(leaves),
+    .clk(clk), .clear(clear | stop), .push(push), .in({row_is_last & result, row}), .pop(leaves),
     .head({tlast, tdata}), .some(tvalid)
   );
 

@@ -11,6 +11,7 @@
 
 pub mod accesses;
 pub mod flaws;
+pub mod full;
 pub mod mutation;
 pub mod outcome;
 pub mod packets;

@@ -26,8 +26,8 @@ pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "an operand of the friction pipeline is bound to another value",
         file: "friction.v",
-        right: "fmin_0_b = phase0_fmin_0 ? limit_product_d37 : limit_product_d1;",
-        wrong: "fmin_0_b = phase0_fmin_0 ? limit_product_d1 : limit_product_d37;",
+        right: "fmin_or_0_b = phase0_fmin_or_0 ? limit_product_d37 : limit_product_d1;",
+        wrong: "fmin_or_0_b = phase0_fmin_or_0 ? limit_product_d1 : limit_product_d37;",
     },
     Mutation {
         name: "the gate of an unused contact point is lost",
@@ -62,7 +62,7 @@ pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "the friction impulses do not start at 0",
         file: "impulses.v",
-        right: "assign impulse1 = first_of_kind ? 32'd0 : inner[31:0];",
+        right: "assign impulse1 = all_are_zero ? 32'd0 : inner[31:0];",
         wrong: "assign impulse1 = inner[31:0];",
     },
     Mutation {
@@ -76,6 +76,78 @@ pub const MUTATIONS: &[Mutation] = &[
         file: "body_shapes.v",
         right: "inverse_mass[table_address] <= {|table_in[30:0], table_in};",
         wrong: "inverse_mass[table_address] <= {|table_in[30:23], table_in};",
+    },
+    Mutation {
+        name: "each collision has the friction of the step",
+        file: "core.v",
+        right: "<= pair_friction ? own_friction : friction_coefficient;",
+        wrong: "<= friction_coefficient;",
+    },
+    Mutation {
+        name: "the spin damping is no argument",
+        file: "core.v",
+        right: ".spin_damping(spin_damping),\n    .impulse0",
+        wrong: ".spin_damping(32'h3dcccccd),\n    .impulse0",
+    },
+    Mutation {
+        name: "a warm pass reads 0 for the given impulses",
+        file: "impulses.v",
+        right: "wire all_are_zero  = first_of_kind & ~warm;",
+        wrong: "wire all_are_zero  = first_of_kind;",
+    },
+    Mutation {
+        name: "a warm contact pass applies no impulse that pulls",
+        file: "fmax_or.v",
+        right: "~condition ? c :",
+        wrong: "~condition ? (c[31] ? 32'd0 : c) :",
+    },
+    Mutation {
+        name: "a warm friction pass solves its second impulse",
+        file: "fmin_or.v",
+        right: "~condition ? c :",
+        wrong: "(~condition & c[0]) ? c :",
+    },
+    Mutation {
+        name: "a warm pass takes the given impulse from itself",
+        file: "contact.v",
+        right: "(solves ? {~impulse3_d123[31], impulse3_d123[30:0]} : 32'h80000000)",
+        wrong: "{~impulse3_d123[31], impulse3_d123[30:0]}",
+    },
+    Mutation {
+        name: "a warm friction pass damps the spin",
+        file: "flogic_and.v",
+        right: "y <= a & b;",
+        wrong: "y <= a;",
+    },
+    Mutation {
+        name: "the friction impulses change places as they leave",
+        file: "core.v",
+        right: "impulse_row   <= friction ? {64'd0, friction_impulses} :",
+        wrong: "impulse_row   <= friction ? {64'd0, friction_impulses[31:0], friction_impulses[63:32]} :",
+    },
+    Mutation {
+        name: "the impulses leave after every pass",
+        file: "step_sequence.v",
+        right: "next_sends <= impulses_out & next_is_last;",
+        wrong: "next_sends <= impulses_out;",
+    },
+    Mutation {
+        name: "a collision enters its last pass without room for its impulses",
+        file: "core.v",
+        right: ".streams_ready(beats_there & (room[0] | ~next_sends))",
+        wrong: ".streams_ready(beats_there)",
+    },
+    Mutation {
+        name: "a collision enters a warm pass without its impulses",
+        file: "core.v",
+        right: "(next_warm ? count[3] >= beats_needed : there[3])",
+        wrong: "there[3]",
+    },
+    Mutation {
+        name: "every pass on stream 3 is as long as a warm one",
+        file: "receiver.v",
+        right: "begin_packet(next_segment, next_is_warm);",
+        wrong: "begin_packet(next_segment, warm_start);",
     },
 ];
 

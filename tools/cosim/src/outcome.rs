@@ -19,6 +19,8 @@ use crate::scene::{Arguments, Scene};
 const BATCH: u32 = 64;
 /// Beats of each stream that are offered at once.
 const OFFERED: usize = 128;
+/// Beats that each stream takes in an exchange.
+pub(crate) const SPACE: usize = 256;
 /// Clocks after which a step that has not ended is given up.
 const CLOCKS_MAX: u64 = 400_000_000;
 
@@ -27,6 +29,8 @@ const CLOCKS_MAX: u64 = 400_000_000;
 pub struct Outcome {
     /// The beats of each result stream.
     pub results: [Vec<StreamBeat>; STREAMS],
+    /// Beats of impulses that stream 0 has in front of its results.
+    pub impulse_beats: usize,
     /// ERROR and `ERROR_DETAIL`.
     pub error: [u32; 2],
     /// Whether the step ended at all.
@@ -81,7 +85,15 @@ pub fn run_with(
         accelerator.write(register.offset, *value)?;
     }
     accelerator.write(AP_CTRL.offset, ap_ctrl::START.mask())?;
-    let mut feed = Feed::new(beats);
+    finish(accelerator, scene, Feed::new(beats))
+}
+
+/// Lets a step that has started end.
+pub(crate) fn finish(
+    accelerator: &mut dyn ExternalAccelerator,
+    scene: &Scene,
+    mut feed: Feed<'_>,
+) -> Result<Outcome, ExternalError> {
     while feed.busy && feed.clocks < CLOCKS_MAX {
         feed.exchange(accelerator)?;
     }
@@ -89,6 +101,7 @@ pub fn run_with(
     let mut read = |offset: u32| accelerator.read(offset);
     Ok(Outcome {
         results,
+        impulse_beats: scene.impulse_beats(),
         error: [read(ERROR.offset)?, read(ERROR_DETAIL.offset)?],
         ended: !busy,
         work: read(WORK_CYCLES.offset)?,
@@ -107,6 +120,8 @@ pub(crate) struct Feed<'a> {
     beats: &'a Beats,
     at: [usize; STREAMS],
     results: [Vec<StreamBeat>; STREAMS],
+    /// Beats that each stream takes in an exchange.
+    pub(crate) space: usize,
     /// Clocks since the start.
     pub(crate) clocks: u64,
     /// Whether the step is under way.
@@ -118,7 +133,8 @@ pub(crate) struct Feed<'a> {
 impl<'a> Feed<'a> {
     pub(crate) fn new(beats: &'a Beats) -> Self {
         let results = Default::default();
-        Self { beats, at: [0; STREAMS], results, clocks: 0, busy: true, interrupt: false }
+        let space = SPACE;
+        Self { beats, at: [0; STREAMS], results, space, clocks: 0, busy: true, interrupt: false }
     }
 
     /// Exchanges beats with the accelerator once.
@@ -130,7 +146,8 @@ impl<'a> Feed<'a> {
             let beats = &self.beats[stream][self.at[stream]..];
             beats[..beats.len().min(OFFERED)].to_vec()
         };
-        let offer = Offer { beats: (0..STREAMS).map(offered).collect(), space: vec![256; STREAMS] };
+        let offer =
+            Offer { beats: (0..STREAMS).map(offered).collect(), space: vec![self.space; STREAMS] };
         let clocked = accelerator.run(BATCH, &offer)?;
         for (at, taken) in self.at.iter_mut().zip(&clocked.taken) {
             *at += taken;
@@ -161,7 +178,9 @@ pub(crate) fn reset(accelerator: &mut dyn ExternalAccelerator) -> Result<(), Ext
 fn flags_of(arguments: &Arguments) -> u32 {
     let word = flags::INTEGRATE.put(0, arguments.integrate.into());
     let word = flags::KINEMATIC.put(word, arguments.kinematic.into());
-    flags::PAIR_FRICTION.put(word, arguments.pair_friction.into())
+    let word = flags::PAIR_FRICTION.put(word, arguments.pair_friction.into());
+    let word = flags::WARM_START.put(word, arguments.warm_start.into());
+    flags::IMPULSES_OUT.put(word, arguments.impulses_out.into())
 }
 
 pub(crate) fn set_up(
@@ -225,21 +244,24 @@ pub fn difference(expected: &Outcome, found: &Outcome, arrival: Arrival) -> Opti
         return None;
     }
     let mut nan = false;
+    let impulse_beats = [expected.impulse_beats, 0, 0, 0];
     for (stream, (expected, found)) in expected.results.iter().zip(&found.results).enumerate() {
         if expected.len() != found.len() {
             let what = format!("beats of results on stream {stream}");
             return differs(&what, &expected.len(), &found.len());
         }
-        for (body, (expected, found)) in expected.iter().zip(found).enumerate() {
+        for (beat, (expected, found)) in expected.iter().zip(found).enumerate() {
+            let place = match beat.checked_sub(impulse_beats[stream]) {
+                Some(body) => format!("body {body} on stream {stream}"),
+                None => format!("beat {beat} of the impulses"),
+            };
             if expected.last != found.last {
-                let what = format!("TLAST of body {body} on stream {stream}");
-                return differs(&what, &expected.last, &found.last);
+                return differs(&format!("TLAST of {place}"), &expected.last, &found.last);
             }
             for (word, (e, f)) in expected.beat.0.into_iter().zip(found.beat.0).enumerate() {
                 nan |= f32::from_bits(e).is_nan();
                 if !same_number(e, f) {
-                    let what = format!("word {word} of body {body} on stream {stream}");
-                    return differs(&what, &e, &f);
+                    return differs(&format!("word {word} of {place}"), &e, &f);
                 }
             }
         }

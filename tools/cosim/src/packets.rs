@@ -40,15 +40,24 @@ pub type Beats = [Vec<StreamBeat>; STREAMS];
 #[must_use]
 pub fn packets(scene: &Scene, fault: Option<FaultAt>) -> Beats {
     let velocities: Vec<Vec<[u32; 4]>> = scene.bodies.iter().map(velocity_rows).collect();
-    let collisions: Vec<Vec<[u32; 4]>> = scene.collisions.iter().map(collision_rows).collect();
     let poses: Vec<Vec<[u32; 4]>> = scene.bodies.iter().map(pose_rows).collect();
-    let passes = match scene.collisions.len() {
-        0 => 0,
-        _ => scene.arguments.contact_iterations + scene.arguments.friction_iterations,
-    };
+    let collisions: Vec<Vec<[u32; 4]>> = scene.collisions.iter().map(collision_rows).collect();
+    let warm = [0, 1].map(|kind| {
+        let rows = scene.collisions.iter().map(|collision| {
+            let mut rows = collision_rows(collision);
+            rows.push(collision.impulses[kind]);
+            rows
+        });
+        rows.collect::<Vec<_>>()
+    });
 
     let mut segments = vec![(&velocities, BODY_STRIPE)];
-    segments.extend((0..passes).map(|_| (&collisions, COLLISION_STRIPE)));
+    for (passes, warm) in scene.passes().into_iter().zip(&warm) {
+        segments.extend((0..passes).map(|pass| match pass {
+            0 if scene.arguments.warm_start => (warm, WARM_STRIPE),
+            _ => (&collisions, COLLISION_STRIPE),
+        }));
+    }
     segments.push((&poses, BODY_STRIPE));
     let mut beats = Beats::default();
     for (number, (records, stripe)) in segments.into_iter().enumerate() {
@@ -66,6 +75,7 @@ pub fn packets(scene: &Scene, fault: Option<FaultAt>) -> Beats {
 /// The stream of each beat, over and over.
 const BODY_STRIPE: &[usize] = &[0, 1, 2, 3];
 const COLLISION_STRIPE: &[usize] = &[0, 1, 2, 3, 0, 1, 2];
+const WARM_STRIPE: &[usize] = &[0, 1, 2, 3, 0, 1, 2, 3];
 
 fn deal(records: &[Vec<[u32; 4]>], stripe: &[usize]) -> Beats {
     let mut packet = Beats::default();

@@ -2,7 +2,7 @@
 
 use pgs_interface::profile::solver::SPIN_DAMPING;
 use pgs_interface::record::CONTACT_POINTS;
-use pgs_interface::record::collision::FRICTION_SHIFT;
+use pgs_interface::record::collision::{FRICTION_BITS, FRICTION_SHIFT};
 use rtlgen::verify::random::SplitMix64;
 
 use crate::packets::{Fault, FaultAt, STREAMS};
@@ -112,7 +112,8 @@ impl Draw {
             };
         }
         let normal = self.unit();
-        Collision { bodies, positions: bodies.map(position), normal, count, points }
+        let impulses = [[0; 4]; 2];
+        Collision { bodies, positions: bodies.map(position), normal, count, points, impulses }
     }
 
     fn pair(&mut self, scene: &Scene) -> [u32; 2] {
@@ -130,6 +131,31 @@ impl Draw {
             }
         }
         [0, 1]
+    }
+
+    /// Impulses for each collision, with any words for unused points; a fault in any packet.
+    fn warm(&mut self, case: &mut Case) {
+        let scene = &mut case.scene;
+        scene.arguments.warm_start = true;
+        for collision in &mut scene.collisions {
+            let count = collision.count & !FRICTION_BITS;
+            let [contact, friction] = &mut collision.impulses;
+            for (point, impulse) in (0_u32..).zip(contact) {
+                *impulse = match (point < count, self.below(8)) {
+                    (false, 0) => NAN,
+                    // A given impulse is applied as it is, even one that pulls.
+                    (_, 1) => self.component(2.0),
+                    _ => self.number(2.0).abs().to_bits(),
+                };
+            }
+            for impulse in &mut friction[..2] {
+                *impulse = self.component(1.0);
+            }
+        }
+        let segments = 2 + scene.passes().iter().sum::<u32>();
+        if let Some(fault) = &mut case.fault {
+            fault.segment = self.below(segments) as usize;
+        }
     }
 
     /// Something that the accelerator refuses.
@@ -171,6 +197,8 @@ pub fn case(seed: u64) -> Case {
         integrate: !draw.one_in(5),
         kinematic: false,
         pair_friction: false,
+        warm_start: false,
+        impulses_out: false,
         numbers: [
             (1.0_f32 / 60.0).to_bits(),
             draw.number(0.02).abs().to_bits(),
@@ -215,13 +243,20 @@ pub fn case(seed: u64) -> Case {
             collision.count |= friction << FRICTION_SHIFT;
         }
     }
+    if draw.one_in(2) {
+        draw.warm(&mut case);
+    }
+    case.scene.arguments.impulses_out = draw.one_in(2);
+    if draw.one_in(12) {
+        // So light that J is 0.
+        case.scene.shapes[0].inverse_mass = f32::MAX.to_bits();
+    }
     case
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::record::collision::FRICTION_BITS;
 
     #[test]
     fn a_seed_gives_the_same_case_and_another_one_another() {
@@ -235,6 +270,16 @@ mod tests {
         assert!(cases.iter().any(|case| case.fault.is_some()));
         assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
         assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
+        for warm in [false, true] {
+            for out in [false, true] {
+                let has = |case: &Case| {
+                    let arguments = &case.scene.arguments;
+                    (arguments.warm_start, arguments.impulses_out) == (warm, out)
+                };
+                assert!(cases.iter().any(|case| has(case) && case.fault.is_none()));
+                assert!(cases.iter().any(|case| has(case) && case.fault.is_some()));
+            }
+        }
         for count in 0..=5 {
             let has = |collision: &Collision| (collision.count & !FRICTION_BITS).min(5) == count;
             assert!(cases.iter().any(|case| case.scene.collisions.iter().any(has)), "{count}");

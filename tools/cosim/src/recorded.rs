@@ -37,6 +37,7 @@ pub fn scene(folder: &Folder) -> Scene {
             normal: bits(collision.normal),
             count: collision.count,
             points,
+            impulses: [[0; 4]; 2],
         }
     });
     let parameters = &folder.parameters;
@@ -50,6 +51,8 @@ pub fn scene(folder: &Folder) -> Scene {
             integrate: parameters.integrate,
             kinematic: parameters.kinematic,
             pair_friction: parameters.pair_friction,
+            warm_start: false,
+            impulses_out: parameters.impulses_out,
             numbers: [
                 parameters.time_step,
                 parameters.position_drift,
@@ -86,6 +89,7 @@ pub fn differences(folder: &Folder, outcome: &Outcome) -> Result<(usize, usize),
 fn bodies(outcome: &Outcome, before: &[DriverBody]) -> Vec<DriverBody> {
     let row = |stream: usize, body: usize| {
         let beats = &outcome.results[stream];
+        let body = body + if stream == 0 { outcome.impulse_beats } else { 0 };
         beats.get(body).map_or([f32::NAN; 4], |beat| beat.beat.0.map(f32::from_bits))
     };
     let three = |[x, y, z, _]: [f32; 4]| [x, y, z];

@@ -48,6 +48,7 @@ fn scene() -> Scene {
             normal: [one, 0, 0],
             count: 1,
             points: [[0; 4]; 4],
+            impulses: [[one, 0, 0, 0]; 2],
         }
     });
     let arguments = Arguments {
@@ -56,6 +57,8 @@ fn scene() -> Scene {
         integrate: true,
         kinematic: false,
         pair_friction: false,
+        warm_start: false,
+        impulses_out: true,
         numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
         gravity: [0, (-9.8_f32).to_bits(), 0],
     };
@@ -75,6 +78,11 @@ pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
     let faulty = |name, code, fault, segment, stream, beat| {
         let fault = Some(FaultAt { fault, segment, stream, beat });
         Refusal { fault, ..plain(name, code) }
+    };
+    let warm = |name, code, fault, segment, stream, beat| {
+        let mut refusal = faulty(name, code, fault, segment, stream, beat);
+        refusal.scene.arguments.warm_start = true;
+        refusal
     };
     let told = |name, code, registers: &[(Register, u32)]| Refusal {
         registers: registers.to_vec(),
@@ -112,6 +120,10 @@ pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
         told("too many passes", ErrorCode::Argument, &[(CONTACT_ITERATIONS, 1 << 16)]),
         faulty("invalid bytes, velocities", ErrorCode::PartialBeat, Fault::Partial, 0, 0, 1),
         faulty("invalid bytes, contact pass 1", ErrorCode::PartialBeat, Fault::Partial, 1, 2, 2),
+        warm("TLAST early, warm contact pass", ErrorCode::TlastEarly, Fault::EarlyLast, 1, 3, 3),
+        warm("no TLAST, warm friction pass", ErrorCode::TlastMissing, Fault::NoLast, 4, 3, 0),
+        warm("no TLAST, friction after warm", ErrorCode::TlastMissing, Fault::NoLast, 6, 3, 0),
+        warm("invalid bytes, warm friction", ErrorCode::PartialBeat, Fault::Partial, 4, 3, 5),
     ]
 }
 

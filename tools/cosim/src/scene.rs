@@ -39,6 +39,8 @@ pub struct Collision {
     pub count: u32,
     /// Points and distances; the slots from `count` on mean nothing.
     pub points: [[u32; 4]; CONTACT_POINTS],
+    /// The impulses to begin with in a step that starts warm: of contact, and of friction.
+    pub impulses: [[u32; 4]; 2],
 }
 
 /// The arguments of a step but for the numbers of bodies and collisions.
@@ -54,6 +56,10 @@ pub struct Arguments {
     pub kinematic: bool,
     /// Whether a friction is above each contact count.
     pub pair_friction: bool,
+    /// Whether each kind of pass begins with given impulses.
+    pub warm_start: bool,
+    /// Whether the impulses go out.
+    pub impulses_out: bool,
     /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
     pub numbers: [u32; 6],
     /// Gravity.
@@ -71,4 +77,24 @@ pub struct Scene {
     pub collisions: Vec<Collision>,
     /// The rest.
     pub arguments: Arguments,
+}
+
+impl Scene {
+    /// Contact passes and friction passes, the warm ones among them.
+    #[must_use]
+    pub fn passes(&self) -> [u32; 2] {
+        let Arguments { contact_iterations, friction_iterations, warm_start, .. } = self.arguments;
+        [contact_iterations, friction_iterations].map(|iterations| match iterations {
+            0 => 0,
+            _ if self.collisions.is_empty() => 0,
+            _ => iterations + u32::from(warm_start),
+        })
+    }
+
+    /// Beats of impulses in front of the results.
+    #[must_use]
+    pub fn impulse_beats(&self) -> usize {
+        let kinds = self.passes().into_iter().filter(|passes| *passes > 0).count();
+        if self.arguments.impulses_out { kinds * self.collisions.len() } else { 0 }
+    }
 }

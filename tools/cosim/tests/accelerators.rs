@@ -16,7 +16,9 @@ use cosim::packets::packets;
 use cosim::{accesses, outcome, random};
 use pgs_interface::record::result;
 use step_folder::folder::Folder;
-use zynq_pgs::{Accelerator, BoardChoice, Error, OpenOptions, StepParameters};
+use zynq_pgs::{
+    Accelerator, BoardChoice, Error, Impulses, OpenOptions, StepParameters, WarmCollisions,
+};
 
 fn config() -> BoardConfig {
     BoardConfig { subnormals: Subnormals::Flush, ..BoardConfig::default() }
@@ -107,6 +109,39 @@ fn the_driver_steps_on_an_accelerator_in_another_process() {
         assert!(error.is_none(), "{error:?} {:?}", board.accelerator_error());
         assert!(!untouched);
     }
+}
+
+/// The impulses of one step go into the next one, both through registers and DMA.
+#[test]
+fn the_driver_steps_warm_on_an_accelerator_in_another_process() {
+    let files = tempfile::tempdir().expect("a folder");
+    let path = program(files.path(), "");
+    let folder = golden("pile5_step60");
+    let mut ends = Vec::new();
+    for external in [false, true] {
+        let mut config = config();
+        let board = if external {
+            let simulator = SimulatorProcess::start_for(&mut config, &path).expect("a simulator");
+            let both = LockStep::new(&config, Box::new(simulator), None).expect("a lock step");
+            board(Box::new(both))
+        } else {
+            EmulatedBoard::new(config).expect("a board")
+        };
+        let choice = BoardChoice::Emulated(board.cpu_port());
+        let options = OpenOptions { board: choice, ..OpenOptions::default() };
+        let mut accelerator = Accelerator::open(options).expect("open");
+        accelerator.set_shapes(&folder.shapes).expect("shapes");
+        let mut bodies = folder.bodies.clone();
+        let parameters = folder.parameters.with_impulses_out(true);
+        accelerator.step(&mut bodies, &folder.collisions, &parameters).expect("a cold step");
+        let impulses = accelerator.impulses().to_vec();
+        assert!(impulses.iter().any(|impulses| *impulses != Impulses::ZERO));
+        let warm = WarmCollisions { collisions: &folder.collisions[..], impulses: &impulses };
+        let parameters = parameters.with_warm_start(true);
+        accelerator.step(&mut bodies, &warm, &parameters).expect("a warm step");
+        ends.push(bodies);
+    }
+    assert_eq!(ends[0], ends[1]);
 }
 
 #[test]

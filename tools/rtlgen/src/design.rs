@@ -4,7 +4,7 @@ use pgs_interface::extension::Extensions;
 use pgs_interface::profile::{Depth, FLOAT};
 use pgs_interface::record::CONTACT_POINTS;
 
-use crate::equations;
+use crate::equations::{self, WarmStart};
 use crate::graph::Graph;
 use crate::schedule::Schedule;
 
@@ -26,6 +26,9 @@ pub struct Parameters {
     /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
     /// specification.
     pub smallest_normal: bool,
+    /// Whether impulses come in (warm start) and go out: FEATURES bit 8. Without it, bits 3 and 4 of FLAGS
+    /// have no effect.
+    pub warm_start: WarmStart,
     /// Clock that `CLOCK_KHZ` reports, kHz.
     pub clock_khz: u32,
 }
@@ -39,13 +42,11 @@ impl Default for Parameters {
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
+            warm_start: WarmStart::Built,
             clock_khz: FLOAT.clock_khz,
         }
     }
 }
-
-/// The extensions of the interface that the Verilog has.
-pub const EXTENSIONS: Extensions = Extensions { warm_start: false, ..Extensions::ALL };
 
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -73,6 +74,13 @@ impl Parameters {
         }
         let Self { address_stages, output_stages, .. } = *self;
         Err(OddReadLatency { address_stages, output_stages, latency })
+    }
+
+    /// The extensions of the interface that the build has.
+    #[must_use]
+    pub fn extensions(&self) -> Extensions {
+        let possible = Extensions::possible(&FLOAT.default_variant());
+        Extensions { warm_start: self.warm_start == WarmStart::Built, ..possible }
     }
 
     /// Cycles from an address to the velocity or the impulses.
@@ -127,10 +135,12 @@ impl Design {
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let interval = FLOAT.initiation_interval;
+        let contact = equations::contact(CONTACT_POINTS, parameters.warm_start);
+        let friction = equations::friction(parameters.warm_start);
         Self {
             parameters,
-            contact: Pipeline::new("contact", equations::contact(CONTACT_POINTS), interval),
-            friction: Pipeline::new("friction", equations::friction(), interval),
+            contact: Pipeline::new("contact", contact, interval),
+            friction: Pipeline::new("friction", friction, interval),
             integration: Pipeline::new("integration", equations::integration(), 1),
         }
     }
@@ -202,6 +212,37 @@ mod tests {
         assert_eq!(with(3, 4).check(), Ok(()));
         let error = with(3, 3).check().expect_err("a latency of 7");
         assert!(error.to_string().contains("a read latency of 7 cycles"), "{error}");
+    }
+
+    /// Nothing waits for the given impulses of a warm pass either: they pass the address registers of the
+    /// memory before a read of them does.
+    #[test]
+    fn the_given_impulses_are_written_before_a_pipeline_reads_them() {
+        // The second cycle of the slot, and the register in front of the memory.
+        let written = 1 + 1;
+        let parameters =
+            Parameters { address_stages: 4, output_stages: 5, ..Parameters::default() };
+        assert_eq!(parameters.check(), Ok(()));
+        let design = Design::new(parameters);
+        for pass in [&design.contact, &design.friction] {
+            let read = unsigned(pass.schedule.impulses_at) - parameters.read_latency();
+            assert!(read > written, "{}: read at {read}", pass.name);
+        }
+    }
+
+    /// A build with a warm start has the same fill and the same window as one without.
+    #[test]
+    fn a_warm_start_makes_no_pass_longer() {
+        let without = Parameters { warm_start: WarmStart::LeftOut, ..Parameters::default() };
+        let [with, without] = [Parameters::default(), without].map(Design::new);
+        assert_eq!(with.depth(&with.contact), without.depth(&without.contact));
+        assert_eq!(with.depth(&with.friction), without.depth(&without.friction));
+        let units = |design: &Design| {
+            let units =
+                design.pipelines().into_iter().flat_map(|pipeline| &pipeline.schedule.units);
+            units.filter(|unit| unit.operation.operator().arithmetic).count()
+        };
+        assert_eq!(units(&with), units(&without));
     }
 
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.

@@ -21,7 +21,7 @@ pub struct Operator {
 }
 
 /// All operations, in the order of the tables.
-pub const ALL: [Operation; 11] = [
+pub const ALL: [Operation; 14] = [
     Operation::Add,
     Operation::Multiply,
     Operation::Divide,
@@ -33,6 +33,9 @@ pub const ALL: [Operation; 11] = [
     Operation::Select,
     Operation::NonZero,
     Operation::Or,
+    Operation::And,
+    Operation::MaximumOr,
+    Operation::MinimumOr,
 ];
 
 impl Operation {
@@ -40,6 +43,7 @@ impl Operation {
     #[must_use]
     pub fn operator(self) -> Operator {
         const AB: &[&str] = &["a", "b"];
+        const ABC: &[&str] = &["condition", "a", "b", "c"];
         let (module, ports, latency, arithmetic): (_, &[&str], _, _) = match self {
             Self::Add => ("fadd", AB, 7, true),
             Self::Multiply => ("fmul", AB, 5, true),
@@ -52,6 +56,9 @@ impl Operation {
             Self::Select => ("fselect", &["condition", "a", "b"], 1, false),
             Self::NonZero => ("fnonzero", &["flag", "a"], 1, false),
             Self::Or => ("flogic_or", AB, 1, false),
+            Self::And => ("flogic_and", AB, 1, false),
+            Self::MaximumOr => ("fmax_or", ABC, 1, false),
+            Self::MinimumOr => ("fmin_or", ABC, 1, false),
         };
         let smallest_normal = matches!(self, Self::Multiply | Self::Divide);
         Operator { module, ports, latency, arithmetic, smallest_normal }

@@ -23,7 +23,7 @@ macro_rules! sources {
 /// The operators, each after the modules that it is made of.
 pub const OPERATORS: &[Source<'_>] = sources! {
     "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
-        "fless", "fselect", "fnonzero", "flogic_or";
+        "fmax_or", "fmin_or", "fless", "fselect", "fnonzero", "flogic_or", "flogic_and";
 };
 
 /// All other hand-written modules, each after the modules that it is made of.

@@ -7,6 +7,7 @@ use super::StreamBeat;
 use crate::config::BoardConfig;
 use pgs_interface::control::{REGISTERS, SHAPE_TABLE};
 use pgs_interface::record::result;
+use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// The first difference between the hardware and the model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,6 +38,18 @@ pub enum DifferencePlace {
         row: usize,
         /// The word of the row, 0 to 3.
         word: usize,
+    },
+    /// A word of the impulses that go out in front of the results.
+    Impulse {
+        /// The beat, from 0: one for each collision after the last pass of each kind.
+        beat: usize,
+        /// The word of the beat, 0 to 3.
+        word: usize,
+    },
+    /// TLAST in the middle of the impulses; the values are 0 and 1.
+    ImpulseLast {
+        /// The beat.
+        beat: usize,
     },
     /// TLAST of a row of a result record; the values are 0 and 1.
     Last {
@@ -72,6 +85,8 @@ impl fmt::Display for DifferencePlace {
             Self::Word { record, row, word } => {
                 write!(f, "results, record {record}, {}, word {word}", row_name(row))
             }
+            Self::Impulse { beat, word } => write!(f, "impulses, beat {beat}, word {word}"),
+            Self::ImpulseLast { beat } => write!(f, "impulses, beat {beat}, TLAST"),
             Self::Last { record, row } => {
                 write!(f, "results, record {record}, {}, TLAST", row_name(row))
             }
@@ -94,7 +109,8 @@ impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { place, cycle, model, hardware, waveform, no_waveform } = self;
         write!(f, "{place}: the model has {model:#010x}")?;
-        let number = matches!(place, DifferencePlace::Word { .. });
+        let number =
+            matches!(place, DifferencePlace::Word { .. } | DifferencePlace::Impulse { .. });
         let float = |bits: u32| f32::from_bits(bits);
         if number {
             write!(f, " ({:e})", float(*model))?;
@@ -118,23 +134,37 @@ pub fn same_number(a: u32, b: u32) -> bool {
     a == b || (f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan())
 }
 
-/// The first difference between the beats number `at` of a result stream.
+/// The first word in which two beats differ, and its values.
+fn first_word(model: &StreamBeat, hardware: &StreamBeat) -> Option<(usize, [u32; 2])> {
+    let words = model.beat.0.into_iter().zip(hardware.beat.0).enumerate();
+    words.map(|(word, (m, h))| (word, [m, h])).find(|(_, [m, h])| !same_number(*m, *h))
+}
+
+/// The first difference between the beats number `at` of a stream out. The stream of the impulses has
+/// `impulses` beats of them in front of its results.
 pub(super) fn first_difference(
     config: &BoardConfig,
     stream: usize,
-    at: usize,
+    (impulses, at): (usize, usize),
     model: &StreamBeat,
     hardware: &StreamBeat,
 ) -> Option<(DifferencePlace, [u32; 2])> {
+    let impulses = if stream == IMPULSES_STREAM { impulses } else { 0 };
+    let lasts = [model.last, hardware.last].map(u32::from);
+    let Some(result) = at.checked_sub(impulses) else {
+        let word = first_word(model, hardware);
+        let differs =
+            word.map(|(word, values)| (DifferencePlace::Impulse { beat: at, word }, values));
+        return differs.or_else(|| {
+            (lasts[0] != lasts[1]).then_some((DifferencePlace::ImpulseLast { beat: at }, lasts))
+        });
+    };
     let streams = config.profile.stripes.results.streams;
     let turn = streams.iter().position(|of| usize::from(*of) == stream).unwrap_or(0);
-    let beat = at * streams.len() + turn;
+    let beat = result * streams.len() + turn;
     let (record, row) = (beat / result::ROWS, beat % result::ROWS);
-    for (word, (m, h)) in model.beat.0.into_iter().zip(hardware.beat.0).enumerate() {
-        if !same_number(m, h) {
-            return Some((DifferencePlace::Word { record, row, word }, [m, h]));
-        }
+    if let Some((word, values)) = first_word(model, hardware) {
+        return Some((DifferencePlace::Word { record, row, word }, values));
     }
-    let lasts = [model.last, hardware.last].map(u32::from);
     (lasts[0] != lasts[1]).then_some((DifferencePlace::Last { record, row }, lasts))
 }

@@ -20,9 +20,10 @@ use self::history::History;
 use super::{Clocked, ExternalAccelerator, ExternalError, ModelAccelerator, Offer, StreamBeat};
 use crate::config::{BoardConfig, ConfigError};
 use pgs_interface::control::{
-    AP_CTRL, BODY_CAPACITY, COLLISION_CAPACITY, CYCLES_HI, CYCLES_LO, ERROR, ERROR_DETAIL, HAZARDS,
-    IMPULSE_SUM_HI, IMPULSE_SUM_LO, MEMORY_BYTES, RESET, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES,
-    WORK_CYCLES, ap_ctrl, reset,
+    AP_CTRL, BODY_CAPACITY, COLLISION_CAPACITY, COLLISIONS, CONTACT_ITERATIONS, CYCLES_HI,
+    CYCLES_LO, ERROR, ERROR_DETAIL, FLAGS, FRICTION_ITERATIONS, HAZARDS, IMPULSE_SUM_HI,
+    IMPULSE_SUM_LO, MEMORY_BYTES, RESET, SUM_RECEIVED, SUM_SENT, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
+    flags, reset,
 };
 use pgs_interface::register::Register;
 
@@ -65,6 +66,8 @@ pub struct LockStep {
     /// Beats of each stream that the hardware has taken and the model has yet to take.
     owed: Vec<VecDeque<StreamBeat>>,
     results: Vec<Results>,
+    /// Beats of impulses that the step sends in front of its results.
+    impulses: usize,
     /// Clocks since the last start or reset.
     cycle: u64,
     busy: bool,
@@ -110,6 +113,7 @@ impl LockStep {
             player,
             owed: inputs,
             results: outputs,
+            impulses: 0,
             cycle: 0,
             busy: false,
             model_busy: false,
@@ -146,6 +150,17 @@ impl LockStep {
         self.nan = false;
     }
 
+    /// Beats of impulses that a step with the model's arguments sends.
+    fn impulses_of_step(&mut self) -> Result<usize, ExternalError> {
+        let mut read = |register: Register| self.model.read(register.offset);
+        if !(self.config.extensions.warm_start && flags::IMPULSES_OUT.is_set(read(FLAGS)?)) {
+            return Ok(0);
+        }
+        let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];
+        let collisions = read(COLLISIONS)? as usize;
+        Ok(kinds.iter().filter(|iterations| **iterations > 0).count().saturating_mul(collisions))
+    }
+
     /// Lets the model run on the beats that the hardware has taken.
     fn run_model(&mut self, clocks: u32) -> Result<(), ExternalError> {
         let beats = self.owed.iter().map(|beats| beats.iter().take(OFFERED_BEATS).copied());
@@ -169,8 +184,8 @@ impl LockStep {
             while let (Some(model), Some((hardware, cycle))) =
                 (results.model.front(), results.hardware.front())
             {
-                let found =
-                    first_difference(&self.config, stream, results.compared, model, hardware);
+                let at = (self.impulses, results.compared);
+                let found = first_difference(&self.config, stream, at, model, hardware);
                 if let Some((place, values)) = found {
                     let cycle = *cycle;
                     return self.differs(place, cycle, values);
@@ -254,6 +269,7 @@ impl ExternalAccelerator for LockStep {
         let starts = offset == AP_CTRL.offset && ap_ctrl::START.is_set(value) && !self.busy;
         if starts {
             self.forget_beats();
+            self.impulses = self.impulses_of_step()?;
             self.history.start();
             self.cycle = 0;
             self.busy = true;

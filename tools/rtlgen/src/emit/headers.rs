@@ -7,7 +7,8 @@ use pgs_interface::control::{
 };
 use pgs_interface::profile::{Depth, FLOAT, solver};
 
-use crate::design::{Design, EXTENSIONS};
+use crate::design::Design;
+use crate::equations::WarmStart;
 use crate::operators;
 
 use super::text::{Text, line};
@@ -64,6 +65,7 @@ pub(super) fn schedule(design: &Design) -> String {
         number("COLLISION_BITS", address_bits(parameters.collisions));
         number("DESIGN_INTERLOCKED", parameters.interlocked.into());
         number("DESIGN_SMALLEST_NORMAL", parameters.smallest_normal.into());
+        number("DESIGN_WARM_START", (parameters.warm_start == WarmStart::Built).into());
         number("SHAPES", FLOAT.shape_capacity.into());
         number("MEMORY_ADDRESS_STAGES", parameters.address_stages.into());
         number("MEMORY_OUTPUT_STAGES", parameters.output_stages.into());
@@ -94,7 +96,7 @@ fn capabilities(text: &mut Text, design: &Design) {
         | features::IMPULSE_SUM.mask()
         | features::FLUSH_SUBNORMALS.mask()
         | features::INTERLOCKED.put(0, parameters.interlocked.into())
-        | EXTENSIONS.features();
+        | parameters.extensions().features();
     let words = [
         ("IDENTIFICATION", control::IDENTIFICATION.reset),
         ("VERSION", control::VERSION.reset),

@@ -201,6 +201,12 @@ impl Emitter<'_> {
                 );
             }
         }
+        // Tools warn of an input that nothing reads.
+        for (input, read) in self.graph.inputs().iter().zip(self.graph.inputs_read()) {
+            if !read {
+                line!(text, "  wire unused_{0} = &{{1'b0, {0}}};", input.name);
+            }
+        }
         for id in self.graph.ids() {
             if self.graph.node(id).kind.operation().is_none() {
                 continue;

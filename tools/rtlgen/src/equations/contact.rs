@@ -7,6 +7,7 @@
 //! ```
 
 use super::row::{self, Row};
+use super::warm::{Warm, WarmStart};
 use crate::graph::{Graph, Source};
 
 /// The graph of a contact pass over a collision of at most `points` contact points.
@@ -15,11 +16,13 @@ use crate::graph::{Graph, Source};
 /// the friction passes: `((L_0 + L_1) + L_2) + L_3`, in which an unused point counts -0.
 ///
 /// The impulse of a point with J = 0 stays 0 without a gate, because the wanted impulse is a product
-/// with J. The impulse of an unused point means nothing, and its flag keeps it from every sum.
+/// with J. The impulse of an unused point means nothing, and its flag keeps it from every sum. Where
+/// impulses leave the chip, both are put out as 0.
 #[must_use]
-pub fn contact(points: usize) -> Graph {
+pub fn contact(points: usize, warm_start: WarmStart) -> Graph {
     let mut graph = Graph::default();
     let g = &mut graph;
+    let warm = Warm::new(g, warm_start);
     let normal = g.input3(Source::Record, "normal");
     let positions = row::SIDES.map(|side| g.input3(Source::Record, &format!("position_{side}")));
     let masses = row::masses(g);
@@ -48,11 +51,11 @@ pub fn contact(points: usize) -> Graph {
                 let speed = g.add(speed, bias);
                 let wanted = g.multiply(speed, row.jacobian);
                 let after = g.add(before, wanted);
-                g.maximum(after, zero)
+                warm.maximum(g, [after, zero], before)
             });
-            let change = g.within("impulse", |g| g.subtract(after, before));
+            let change = g.within("impulse", |g| warm.change(g, after, before));
             velocities = row.apply(g, change, acts, velocities, masses);
-            g.output(&format!("impulse{i}"), &[after]);
+            warm.output(g, &format!("impulse{i}"), after, acts);
             let counted = after.only_if(acts);
             sum = Some(match sum {
                 None => after,

@@ -36,6 +36,8 @@ pub enum Source {
     Impulse,
     /// An argument or a constant of the step; it does not change while the step runs.
     Argument,
+    /// One bit that does not change while a pass runs.
+    Switch,
 }
 
 /// An operation of the hardware library.
@@ -63,6 +65,12 @@ pub enum Operation {
     NonZero,
     /// One bit or the other.
     Or,
+    /// Both of two bits.
+    And,
+    /// Condition (one bit) ? (a > b ? a : b) : c.
+    MaximumOr,
+    /// Condition (one bit) ? (a < b ? a : b) : c.
+    MinimumOr,
 }
 
 /// The kind of a node.
@@ -81,17 +89,19 @@ impl Kind {
     #[must_use]
     pub fn width(self) -> u32 {
         match self {
-            Self::Input(Source::Flag)
-            | Self::Operation(Operation::Less | Operation::NonZero | Operation::Or) => 1,
+            Self::Input(Source::Flag | Source::Switch)
+            | Self::Operation(
+                Operation::Less | Operation::NonZero | Operation::Or | Operation::And,
+            ) => 1,
             Self::Operation(Operation::SineCosine) => 64,
             _ => 32,
         }
     }
 
-    /// Whether the value is the same for all records of a step and needs no delay.
+    /// Whether the value is the same for all records of a pass and needs no delay.
     #[must_use]
     pub fn is_still(self) -> bool {
-        matches!(self, Self::Input(Source::Argument) | Self::Constant(_))
+        matches!(self, Self::Input(Source::Argument | Source::Switch) | Self::Constant(_))
     }
 
     /// The operation that computes the value, if one does.
@@ -231,6 +241,14 @@ impl Graph {
             }
         }
         readers
+    }
+
+    /// For each input port whether an operation or an output reads it.
+    pub fn inputs_read(&self) -> impl Iterator<Item = bool> {
+        let operations = self.nodes.iter().flat_map(Node::reads);
+        let outputs = self.outputs.iter().flat_map(|output| &output.operands);
+        let read: BTreeSet<NodeId> = operations.chain(outputs.flat_map(Operand::nodes)).collect();
+        self.inputs.iter().map(move |input| input.nodes.iter().any(|node| read.contains(node)))
     }
 
     /// Prefixes the names of all nodes that `build` makes.
@@ -383,6 +401,21 @@ impl Graph {
     /// Whether one of two flags is set, a flag.
     pub fn either(&mut self, a: Operand, b: Operand) -> Operand {
         self.operation(Operation::Or, vec![a, b], "either")
+    }
+
+    /// Whether both of two flags are set, a flag.
+    pub fn both(&mut self, a: Operand, b: Operand) -> Operand {
+        self.operation(Operation::And, vec![a, b], "both")
+    }
+
+    /// `condition ? maximum(a, b) : c`; `condition` is a flag.
+    pub fn maximum_or(&mut self, condition: Operand, [a, b]: [Operand; 2], c: Operand) -> Operand {
+        self.operation(Operation::MaximumOr, vec![condition, a, b, c], "maximum")
+    }
+
+    /// `condition ? minimum(a, b) : c`; `condition` is a flag.
+    pub fn minimum_or(&mut self, condition: Operand, [a, b]: [Operand; 2], c: Operand) -> Operand {
+        self.operation(Operation::MinimumOr, vec![condition, a, b, c], "minimum")
     }
 }
 

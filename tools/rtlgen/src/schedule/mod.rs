@@ -152,14 +152,16 @@ fn round_up(cycle: i32, interval: i32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::equations;
+    use crate::equations::{self, WarmStart};
 
-    fn all() -> [(Graph, u32); 4] {
+    fn all() -> [(Graph, u32); 6] {
         [
-            (equations::contact(4), 2),
-            (equations::friction(), 2),
+            (equations::contact(4, WarmStart::Built), 2),
+            (equations::friction(WarmStart::Built), 2),
+            (equations::contact(4, WarmStart::LeftOut), 2),
+            (equations::friction(WarmStart::LeftOut), 2),
             (equations::integration(), 1),
-            (equations::contact(4), 3),
+            (equations::contact(4, WarmStart::Built), 3),
         ]
     }
 

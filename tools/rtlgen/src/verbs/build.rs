@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use rtlgen::design::{Design, OddReadLatency, Parameters};
+use rtlgen::equations::WarmStart;
 
 /// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -19,6 +20,13 @@ enum SmallestNormal {
     Exact,
     /// Sometimes zero: off the specification, for the cost of the rule.
     Dropped,
+}
+
+/// An extension of the interface that a build need not have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Extension {
+    /// Impulses in and out.
+    WarmStart,
 }
 
 /// A build of the accelerator.
@@ -47,6 +55,9 @@ pub(crate) struct BuildArgs {
     /// Products and quotients that round up to the smallest normal number
     #[arg(long, value_enum, default_value_t = SmallestNormal::Exact)]
     smallest_normal: SmallestNormal,
+    /// An extension to leave out, for the cost of it
+    #[arg(long, value_enum, value_name = "EXTENSION")]
+    without: Vec<Extension>,
     /// Clock that the capability register reports, kHz
     #[arg(long, value_name = "KHZ", default_value_t = Parameters::default().clock_khz)]
     clock_khz: u32,
@@ -55,6 +66,10 @@ pub(crate) struct BuildArgs {
 impl BuildArgs {
     /// The design that the options describe.
     pub(crate) fn design(&self) -> Result<Design, OddReadLatency> {
+        let warm_start = match self.without.contains(&Extension::WarmStart) {
+            true => WarmStart::LeftOut,
+            false => WarmStart::Built,
+        };
         let parameters = Parameters {
             bodies: self.bodies,
             collisions: self.collisions,
@@ -62,6 +77,7 @@ impl BuildArgs {
             address_stages: self.address_stages,
             output_stages: self.output_stages,
             smallest_normal: self.smallest_normal == SmallestNormal::Exact,
+            warm_start,
             clock_khz: self.clock_khz,
         };
         parameters.check()?;

@@ -25,7 +25,7 @@ fn pair(low: u32, high: u32) -> u64 {
 }
 
 /// The operators of `operators_top.v`.
-pub static OPERATORS: [Operator; 13] = [
+pub static OPERATORS: [Operator; 16] = [
     Operator {
         name: "add",
         latency: 7,
@@ -94,6 +94,28 @@ pub static OPERATORS: [Operator; 13] = [
         latency: 1,
         expected: |v| (v.argument & 3 != 0).into(),
         found: |outputs| (outputs[11] >> 2 & 1).into(),
+    },
+    Operator {
+        name: "and",
+        latency: 1,
+        expected: |v| (v.argument & 3 == 3).into(),
+        found: |outputs| (outputs[11] >> 3 & 1).into(),
+    },
+    Operator {
+        name: "max, or a third",
+        latency: 1,
+        expected: |v| {
+            if v.argument & 1 == 1 { reference::max(v.a, v.b) } else { v.radicand }.into()
+        },
+        found: |outputs| outputs[12].into(),
+    },
+    Operator {
+        name: "min, or a third",
+        latency: 1,
+        expected: |v| {
+            if v.argument & 1 == 1 { reference::min(v.a, v.b) } else { v.radicand }.into()
+        },
+        found: |outputs| outputs[13].into(),
     },
     Operator {
         name: "mul, SMALLEST_NORMAL = 0",

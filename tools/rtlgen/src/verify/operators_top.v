@@ -1,11 +1,11 @@
 // Every operator beside the others, for the vectors of `rtlgen operators`. In each cycle four words
-// go in and twelve come out, each result after the latency of its operator.
+// go in and fourteen come out, each result after the latency of its operator.
 `default_nettype none
 
 module operators_top (
   input  wire         clk,
   input  wire [127:0] operands,
-  output wire [383:0] results
+  output wire [447:0] results
 );
 
   wire [31:0] a        = operands[31:0];
@@ -13,9 +13,9 @@ module operators_top (
   wire [31:0] radicand = operands[95:64];
   wire [31:0] argument = operands[127:96];
 
-  wire [2:0] flags;
+  wire [3:0] flags;
 
-  assign results[383:352] = {29'd0, flags};
+  assign results[383:352] = {28'd0, flags};
 
   fadd add (.clk(clk), .a(a), .b(b), .y(results[31:0]));
   fmul mul (.clk(clk), .a(a), .b(b), .y(results[63:32]));
@@ -30,6 +30,9 @@ module operators_top (
   fless less (.clk(clk), .a(a), .b(b), .y(flags[0]));
   fnonzero nonzero (.clk(clk), .flag(argument[0]), .a(a), .y(flags[1]));
   flogic_or logic_or (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[2]));
+  flogic_and logic_and (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[3]));
+  fmax_or max_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[415:384]));
+  fmin_or min_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[447:416]));
 
 endmodule
 

@@ -22,7 +22,7 @@ pub const BATCH: usize = 4_096;
 const OPERANDS: usize = 4;
 
 /// Words of a cycle's results.
-pub const RESULTS: usize = 12;
+pub const RESULTS: usize = 14;
 
 /// The outputs of all operators in one cycle, in the order of `operators_top.v`.
 pub type Outputs = [u32; RESULTS];
