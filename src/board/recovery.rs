@@ -7,7 +7,6 @@ use super::plan::Plan;
 use super::root_cause::other_bitstream;
 use super::symptom::Symptom;
 use crate::axi_dma::DmaError;
-use crate::control_block::Capabilities;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
 use crate::scene::Shape;
@@ -113,10 +112,16 @@ impl Device {
             return Err(other_bitstream(changed));
         }
         self.was_reset();
-        let Capabilities { variant, shape_capacity, .. } = &self.capabilities;
-        self.control.load_shapes(shapes, variant.inertia, *shape_capacity);
+        self.load_shapes(shapes);
         log::info!("the board was reset after a fault");
         Ok(())
+    }
+
+    /// Writes shapes that were checked to the table, unless their masses are streamed.
+    pub(crate) fn load_shapes(&mut self, shapes: &[Shape]) {
+        if !self.capabilities.streams_masses(shapes.len()) {
+            self.control.load_shapes(shapes, self.capabilities.variant.inertia);
+        }
     }
 
     /// Gives the board up. All memory stays with the engines, which may still reach it.

@@ -123,7 +123,10 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
             described(&capabilities.variant),
             capabilities.clock_khz,
             capabilities.body_capacity,
-            capabilities.shape_capacity,
+            match capabilities.extensions.streamed_masses {
+                true => "any number of".to_owned(),
+                false => capabilities.shape_capacity.to_string(),
+            },
         ),
     );
     Some(capabilities)

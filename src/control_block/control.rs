@@ -79,7 +79,8 @@ impl Control {
     }
 
     /// Writes the arguments that differ from the values in the registers. A board without an
-    /// extension has no register for its argument. Masses are in the shape table, or streamed.
+    /// extension has no register for its argument. With the second of `parameters` the bodies bring their
+    /// masses; else the shape table has them.
     pub(crate) fn set_arguments(
         &mut self,
         bodies: u32,

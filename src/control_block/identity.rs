@@ -71,6 +71,11 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
+    /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
+    pub(crate) const fn streams_masses(&self, shapes: usize) -> bool {
+        self.extensions.streamed_masses && shapes > self.shape_capacity as usize
+    }
+
     /// The largest number of shapes. Where each body can bring its inverse mass, the table does not limit it.
     #[must_use]
     pub const fn shapes_max(&self) -> u32 {

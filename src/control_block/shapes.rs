@@ -9,13 +9,9 @@ use super::Control;
 use crate::scene::Shape;
 
 impl Control {
-    /// Writes shapes that were checked: they are isotropic, unless the inertia is streamed with the
-    /// velocities and the table holds masses only. If there are more than `capacity`, their masses are
-    /// streamed, too, and the table is not used.
-    pub(crate) fn load_shapes(&mut self, shapes: &[Shape], inertia: Inertia, capacity: u32) {
-        if shapes.len() > capacity as usize {
-            return;
-        }
+    /// Writes shapes that were checked: the table has room for them, and they are isotropic, unless
+    /// the inertia is streamed with the velocities and the table holds masses only.
+    pub(crate) fn load_shapes(&mut self, shapes: &[Shape], inertia: Inertia) {
         for (entry, shape) in (SHAPE_TABLE..).step_by(SHAPE_STRIDE as usize).zip(shapes) {
             for offset in (0..SHAPE_STRIDE).step_by(4) {
                 let value = match offset {
@@ -41,7 +37,7 @@ mod tests {
     fn an_entry_is_mass_inertia_and_two_zeros() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.load_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)], Inertia::Isotropic, 64);
+        control.load_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 1.5)], Inertia::Isotropic);
         let second: Vec<_> = registers.with(|state| state.writes[4..].to_vec());
         assert_eq!(second, [(0x410, 0x3F80_0000), (0x414, 0x3FC0_0000), (0x418, 0), (0x41C, 0)]);
     }
@@ -50,7 +46,7 @@ mod tests {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let shape = Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] };
-        control.load_shapes(&[shape], Inertia::World, 64);
+        control.load_shapes(&[shape], Inertia::World);
         let entry: Vec<_> = registers.with(|state| state.writes.clone());
         assert_eq!(entry, [(0x400, 0x3F80_0000), (0x404, 0), (0x408, 0), (0x40C, 0)]);
     }

@@ -128,9 +128,9 @@ impl Accelerator {
         &self.device.capabilities
     }
 
-    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. They are as many as
-    /// the bitstream's table has entries; a bitstream of world inertia that takes streamed masses (interface
-    /// 1.2) takes any number, for each body then brings its own. A step that
+    /// Loads the shapes that bodies refer to by index, in place of all earlier ones. The
+    /// bitstream's table limits their number. A bitstream of world inertia with streamed masses (interface
+    /// 1.2) takes any number: each body then brings its own mass. A step that
     /// was [prepared](InFlight::prepare) with the earlier shapes is refused from now on.
     ///
     /// # Errors
@@ -140,8 +140,7 @@ impl Accelerator {
         standard(|| {
             self.settle()?;
             validate_shapes(shapes, &self.limits)?;
-            let Limits { variant, shape_capacity, .. } = &self.limits;
-            self.device.control.load_shapes(shapes, variant.inertia, *shape_capacity);
+            self.device.load_shapes(shapes);
             self.shapes_loaded += 1;
             self.shapes.clear();
             self.shapes.extend_from_slice(shapes);

@@ -80,7 +80,7 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
     }
 
     /// Lays the step out over the channels.
-    fn plan(&self, ordering: &Ordering, order_summary: &OrderSummary) -> Plan {
+    fn plan(&self, ordering: &Ordering, order_summary: &OrderSummary, device: &Device) -> Plan {
         let lives = order_summary.live.map(|_| ordering.lives());
         let bodies = lives.map_or(self.bodies.len(), |lives| lives.velocities().len());
         let collisions = match lives {
@@ -95,7 +95,7 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
             collisions,
             passes: self.parameters.passes(),
             variant: self.limits.variant,
-            streamed_masses: self.limits.streams_masses(self.shapes.len()),
+            streamed_masses: device.capabilities.streams_masses(self.shapes.len()),
         }
     }
 
@@ -147,7 +147,7 @@ impl Accelerator {
         host.order = watch.lap();
 
         let ordering = &orderings[bank];
-        let plan = input.plan(ordering, &order_summary);
+        let plan = input.plan(ordering, &order_summary, device);
         let given = collisions.len();
         let ordered = ordering.schedule().collisions();
         let all_sent = !order_summary.scheduled || ordered + order_summary.empty == given;

@@ -113,7 +113,7 @@ impl Accelerator {
 
         let variant = limits.variant;
         let passes = parameters.passes();
-        let streamed_masses = limits.streams_masses(shapes.len());
+        let streamed_masses = device.capabilities.streams_masses(shapes.len());
         let mut plan =
             Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)

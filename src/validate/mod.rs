@@ -95,11 +95,6 @@ impl Limits {
         }
     }
 
-    /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
-    pub(crate) fn streams_masses(&self, shapes: usize) -> bool {
-        self.extensions.streamed_masses && exceeds(shapes, self.shape_capacity)
-    }
-
     /// The number of collisions that fit beside `bodies` bodies.
     pub(crate) fn room_for_collisions(&self, bodies: usize) -> u32 {
         let for_bodies = (bodies as u64).saturating_mul(u64::from(self.bytes_per_body));

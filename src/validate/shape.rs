@@ -27,7 +27,7 @@ pub(crate) fn check_shapes(
     if shapes.is_empty() {
         return Err(InputError::NoShapes);
     }
-    if exceeds(shapes.len(), limits.shape_capacity) && !limits.streams_masses(shapes.len()) {
+    if exceeds(shapes.len(), limits.shape_capacity) && !limits.extensions.streamed_masses {
         return Err(InputError::TooManyShapes {
             found: shapes.len(),
             limit: limits.shape_capacity,

@@ -89,7 +89,8 @@ pub(crate) fn velocity_rows(variant: &Variant, step: &Step, body: &Body, k: usiz
     let mut rows = vec![row(format, body.linear, body.shape), row(format, body.angular, 0)];
     if variant.inertia == Inertia::World {
         let [xx, yy, zz, xy, xz, yz] = step.world_inertia(k);
-        rows.push(row(format, [xx, yy, zz], 0));
+        let mass = step.masses.get(k).map_or(0, |mass| encode(format, *mass));
+        rows.push(row(format, [xx, yy, zz], mass));
         rows.push(row(format, [xy, xz, yz], 0));
     }
     rows

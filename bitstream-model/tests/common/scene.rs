@@ -56,6 +56,8 @@ pub(crate) struct Step {
     /// any there is none.
     pub(crate) impulses: Vec<[[f32; 4]; 2]>,
     pub(crate) impulses_out: bool,
+    /// The inverse mass that each body brings with its world inertia; without any, all have their shape's.
+    pub(crate) masses: Vec<f32>,
     /// Contact and friction passes.
     pub(crate) iterations: [u32; 2],
     pub(crate) integrate: bool,
@@ -78,6 +80,7 @@ impl Step {
             frictions: Vec::new(),
             impulses: Vec::new(),
             impulses_out: false,
+            masses: Vec::new(),
             iterations: [4, 4],
             integrate: true,
             time_step: 0.5,
@@ -150,6 +153,7 @@ impl Step {
         let word = flags::INTEGRATE.put(0, self.integrate.into());
         let word = flags::PAIR_FRICTION.put(word, (!self.frictions.is_empty()).into());
         let word = flags::WARM_START.put(word, (!self.impulses.is_empty()).into());
+        let word = flags::STREAMED_MASSES.put(word, (!self.masses.is_empty()).into());
         host.set_control(control::FLAGS, flags::IMPULSES_OUT.put(word, self.impulses_out.into()));
         let [x, y, z] = self.gravity;
         for (register, value) in [

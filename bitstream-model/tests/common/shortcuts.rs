@@ -225,13 +225,22 @@ pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
 }
 
 /// The step with each extension of `float` whose bit is set: a friction for each collision, a warm start,
-/// impulses that go out. Another design takes the step as it is.
-pub(crate) fn extended(step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
+/// impulses that go out, a mass of each body. Another design has the masses alone; a board without them ignores
+/// them.
+pub(crate) fn extended(mut step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
+    let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
+    let has = |bit: u8| bits >> bit & 1 == 1;
+    if has(3) {
+        // A body of the static shape has no mass, and a shape beyond the table does not matter.
+        let mass = |(n, body): (usize, &Body)| match body.shape {
+            STATIC => 0.0,
+            _ => 1.5 + of(n, 9),
+        };
+        step.masses = step.bodies.iter().enumerate().map(mass).collect();
+    }
     if *profile != FLOAT {
         return step;
     }
-    let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
-    let has = |bit: u8| bits >> bit & 1 == 1;
     let each = 0..step.collisions.len();
     let impulses = |n| [0, 4].map(|k| [0, 1, 2, 3].map(|at| 0.1 * of(n, k + at)));
     Step {

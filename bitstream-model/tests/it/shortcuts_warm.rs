@@ -22,7 +22,7 @@ const WARM: [usize; 2] = [3, 4];
 
 /// A step with a warm start, whose impulses go out.
 fn warm(step: Step) -> Step {
-    extended(step, 0b111, 7, &FLOAT)
+    extended(step, 0b1111, 7, &FLOAT)
 }
 
 fn config(inertia: Inertia) -> BoardConfig {
@@ -61,7 +61,7 @@ fn steps_with_impulses_take_the_short_cuts_to_their_end() {
     log::set_logger(&Counter).expect("no other test has a logger");
     log::set_max_level(log::LevelFilter::Debug);
     for (extensions, inertia) in
-        (0..8).flat_map(|bits| [Inertia::Isotropic, Inertia::World].map(|of| (bits, of)))
+        (0..16).flat_map(|bits| [Inertia::Isotropic, Inertia::World].map(|of| (bits, of)))
     {
         let step = extended(large(), extensions, 7, &FLOAT);
         for length_width in [14, 26] {

@@ -43,7 +43,7 @@ typedef enum zpgs_status {
     ZPGS_STATUS_REOPEN = 7,
     // `zpgs_cancel` ended the step. The board works, and the next step is not cancelled.
     ZPGS_STATUS_CANCELLED = 8,
-    // The call does not fit: a step is in flight, or none is; a list of collisions is open, or none is.
+    // The call does not fit: a step is in flight, or none is; or no list of collisions is open.
     ZPGS_STATUS_SEQUENCE = 9,
     // Another thread is in a call with the same accelerator.
     ZPGS_STATUS_BUSY = 10,

@@ -126,7 +126,7 @@ impl State {
 
     /// Takes the ticket of the step in flight.
     fn ticket(&mut self) -> Result<Detached, Failure> {
-        let none = || Failure::sequence("no step is in flight: call zpgs_submit first");
+        let none = || Failure::sequence("no step is in flight: call zpgs_submit or zpgs_end first");
         self.ticket.take().ok_or_else(none)
     }
 

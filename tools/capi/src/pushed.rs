@@ -12,7 +12,7 @@ use crate::failure::Failure;
 #[derive(Debug, Default)]
 pub(crate) struct Pushed {
     collisions: Vec<Collision>,
-    /// One for each collision, or for those in front of the first that came without.
+    /// One for each collision, up to the first that came without impulses.
     impulses: Vec<Impulses>,
     stage: Stage,
 }
@@ -37,7 +37,7 @@ impl Pushed {
         self.stage = Stage::Open;
     }
 
-    /// Appends collisions, all or none. `impulses` are those of the collisions, or `None`.
+    /// Appends collisions, all or none. `impulses` has one entry for each of them, if given.
     pub(crate) fn push(
         &mut self,
         collisions: &[Collision],

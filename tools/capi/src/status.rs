@@ -25,7 +25,7 @@ pub enum Status {
     Reopen = 7,
     /// `zpgs_cancel` ended the step. The board works, and the next step is not cancelled.
     Cancelled = 8,
-    /// The call does not fit: a step is in flight, or none is; a list of collisions is open, or none is.
+    /// The call does not fit: a step is in flight, or none is; or no list of collisions is open.
     Sequence = 9,
     /// Another thread is in a call with the same accelerator.
     Busy = 10,

@@ -4,8 +4,7 @@
 
 namespace {
 
-// Shapes that are kept from step to step: the entries of the board's table. A step may have more, which not
-// every board takes.
+// Shapes of several steps: at most the entries of the board's table. The shapes of one step may be more.
 const size_t SHAPES = 64;
 // A collision has one normal, a manifold has one for each point. Points share a collision if their normals
 // differ by less than 2.6 degrees.

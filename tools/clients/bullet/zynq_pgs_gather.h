@@ -49,6 +49,8 @@ public:
     const std::vector<zpgs_shape> &shapes() const { return m_shapes; }
     // Another number for another table of shapes.
     uint64_t shapesVersion() const { return m_shapesVersion; }
+    // Forgets the shapes, as after the board has refused them.
+    void clearShapes();
 
 private:
     void addManifold(btPersistentManifold *manifold, const btContactSolverInfo &info);
@@ -57,7 +59,6 @@ private:
     uint32_t bodyOf(btCollisionObject *object, const btContactSolverInfo &info);
     uint32_t shapeOf(btScalar inverseMass, const btVector3 &inverseInertia);
     void clearGathered();
-    void clearShapes();
 
     // Bullet's points of a collision: element i is that of contact i; the rest is null.
     using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
@@ -80,6 +81,6 @@ private:
     std::map<std::array<float, 4>, uint32_t> m_shapeIndices;
     uint64_t m_shapesVersion = 0;
     bool m_tooManyShapes = false;
-    // Whether the table was empty when the step began.
+    // Whether the table was empty when the gathering began: it may then grow beyond SHAPES.
     bool m_fresh = true;
 };

@@ -81,6 +81,8 @@ bool ZynqPgsSolver::loadShapes() {
     const std::vector<zpgs_shape> &shapes = m_gather.shapes();
     m_hasShapes = !failed(zpgs_set_shapes(m_board, shapes.data(), shapes.size()));
     m_shapesVersion = m_gather.shapesVersion();
+    // Otherwise later steps would bring the refused shapes again, although they need few of them.
+    if (!m_hasShapes) m_gather.clearShapes();
     return m_hasShapes;
 }
 

@@ -368,7 +368,8 @@ fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<boo
     Ok(all_found)
 }
 
-/// Builds a simulator of these files; the first random step on which it and the model differ.
+/// Builds a simulator of these files; the first random step, or step with full streams, on which it and the
+/// model differ.
 fn difference_of(files: &[File], cases: u64) -> Result<Option<String>, Failure> {
     let folder = tempfile::tempdir()?;
     let mut args = SimulatorArgs {

@@ -153,7 +153,8 @@ impl LockStep {
     /// Beats of impulses that a step with the model's arguments sends.
     fn impulses_of_step(&mut self) -> Result<usize, ExternalError> {
         let mut read = |register: Register| self.model.read(register.offset);
-        if !(self.config.extensions.warm_start && flags::IMPULSES_OUT.is_set(read(FLAGS)?)) {
+        if !(self.config.built_extensions().warm_start && flags::IMPULSES_OUT.is_set(read(FLAGS)?))
+        {
             return Ok(0);
         }
         let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];

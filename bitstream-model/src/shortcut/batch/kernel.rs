@@ -251,6 +251,7 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     kept: Option<&mut [SideInertias; 2]>,
     rows: Rows,
 ) {
+    debug_assert!(!F::ABOUT_AXES || kept.is_some(), "the inertias of a block");
     let [kept_a, kept_b] = match kept {
         Some([a, b]) => [Some(a), Some(b)],
         None => [None, None],

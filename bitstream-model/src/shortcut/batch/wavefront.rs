@@ -40,7 +40,7 @@ use pgs_interface::profile::Inertia;
 
 /// Blocks of a chunk.
 const CHUNK: usize = 8;
-/// Passes that a thread takes at once, at most: the ones of a kind in a usual step with a warm start.
+/// Passes that a thread takes at once, at most: the passes of one kind in a usual step with a warm start.
 const BUNDLE_MAX: usize = 5;
 /// Looks at another thread's front before the processor is given away.
 const SPINS: u32 = 200;
@@ -72,7 +72,8 @@ pub(crate) struct Passes<'a> {
     pub(crate) finding: Option<u32>,
     /// In a step with a warm start the impulses that came in, for each block.
     pub(crate) given: &'a [Given],
-    /// With world inertia: whether the first pass gathers the inverse inertias, because none has in this step.
+    /// With world inertia: whether the first pass gathers the inverse inertias. No pass of this step has done
+    /// it before.
     pub(crate) gathers: bool,
     pub(crate) width: Width,
     /// Precision of the arithmetic.
@@ -104,6 +105,7 @@ impl Fronts {
         inertias: &[InertiaRow],
         crew: &mut Crew,
     ) -> u64 {
+        debug_assert!(kept.is_empty() || kept.len() == blocks.len(), "{} kept", kept.len());
         let count = passes.numbers.len();
         if self.progress.len() < count {
             self.progress.resize_with(count, Progress::default);
@@ -114,6 +116,7 @@ impl Fronts {
         let field = Field {
             passes,
             blocks: blocks.as_mut_ptr(),
+            // An entry for each block, or none at all.
             kept: (kept.len() == blocks.len()).then_some(kept.as_mut_ptr()),
             order: &self.order.blocks,
             rows: Rows { bodies: lines.as_mut_ptr().cast(), inertias: inertias.as_ptr() },
@@ -149,7 +152,7 @@ struct Field<'a> {
     alone: bool,
 }
 
-// SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
+// SAFETY: blocks, their kept inertias and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
 // has taken. The chunks of the pass before over the same bodies or blocks have ended, and so have this
 // pass's earlier chunks: `progress` tells it with release and acquire.
 unsafe impl Sync for Field<'_> {}
@@ -204,8 +207,8 @@ impl Field<'_> {
     /// The next passes that no thread has.
     fn next_bundle(&self) -> Range<usize> {
         let count = self.progress.len();
-        // As few bundles as possible; two threads take one each. The first of two lengths is the shorter one:
-        // its thread is the one that waits for the memory.
+        // As few bundles as possible, and one for each of two threads. Earlier bundles are not longer than
+        // later ones: the thread of the first one waits for memory.
         let bundles = count.div_ceil(BUNDLE_MAX).max(if self.alone { 1 } else { 2 });
         let begin = |bundle: usize| bundle.min(bundles) * count / bundles;
         if self.next.load(Ordering::Relaxed) >= bundles {
@@ -307,9 +310,8 @@ impl Field<'_> {
         let blocks = &self.order[chunk * CHUNK..behind];
         let ahead = &self.order[(chunk * CHUNK + 1)..(behind + 1).min(end)];
         let format = PhantomData::<(F, I)>;
-        let sum_of = &mut sum;
-        let work =
-            ChunkWork::<F, I, WARM> { field: self, pass, blocks, ahead, sum: sum_of, format };
+        let sums = &mut sum;
+        let work = ChunkWork::<F, I, WARM> { field: self, pass, blocks, ahead, sum: sums, format };
         if let Err(work) = self.passes.width.run(work) {
             work.one_by_one();
         }
@@ -361,7 +363,7 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
             let arithmetic = F::arithmetic(instructions);
             // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays, and one to
             // spare for each thread. While the thread has the chunk, the rows of its bodies are its own: see
-            // `Sync`.
+            // `Sync`. `kept` has an entry for each block (`Fronts::run`), and this one belongs to the block.
             unsafe {
                 let rows = self.field.rows;
                 let kept = self.field.kept.map(|kept| &mut *kept.add(index as usize));

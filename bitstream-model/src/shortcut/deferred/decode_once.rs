@@ -203,6 +203,7 @@ impl Decoded {
             let records = (issues * self.together()).min(total - known);
             let [before, sums @ ..] = &mut self.sums[known..=known + records] else { return };
             let (batch, masses) = (&mut self.batch, &self.masses);
+            // The decoder asks which bodies move, and nothing else.
             let properties = Properties { shape_of, masses, inverse_masses, inertias: &[] };
             let decoded = match &mut self.translation {
                 Some(translation) => translation.decode(batch, streams, records, properties, sums),

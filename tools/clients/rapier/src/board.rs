@@ -74,7 +74,7 @@ impl Board {
             });
             handles.push(handle);
             index.insert(handle, at);
-            // The board refuses more shapes than its table has.
+            // A board without streamed masses refuses more shapes than its table has.
             let shape = u32::try_from(place).unwrap_or(u32::MAX);
             bodies.push(Body { shape, ..placed(body) });
         }

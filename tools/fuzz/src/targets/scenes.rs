@@ -71,11 +71,17 @@ impl Scene {
         Self { shapes, bodies, collisions, impulses }
     }
 
-    /// Sometimes has more shapes than the table of a board that can do without: masses are then streamed.
+    /// Sometimes has more shapes than the table of a board that streams masses, and bodies of the last ones.
     pub(super) fn outgrow(&mut self, input: &mut Input<'_>, extensions: Extensions) {
-        if extensions.streamed_masses && input.one_in(4) {
-            let last = self.shapes[self.shapes.len() - 1];
-            self.shapes.resize(70, last);
+        if !extensions.streamed_masses || !input.one_in(4) {
+            return;
+        }
+        let own = self.shapes.len() as u32;
+        self.shapes.extend((own..70).map(|number| Shape::isotropic(1.0 + number as f32, 1.5)));
+        for body in self.bodies.iter_mut().filter(|body| (1..own).contains(&body.shape)) {
+            if input.one_in(2) {
+                body.shape = 64 + input.below(6);
+            }
         }
     }
 

@@ -359,6 +359,7 @@ impl OpenBoard {
             "friction_window_cycles": can.friction.window,
             "body_capacity": can.body_capacity,
             "shape_capacity": can.shape_capacity,
+            "streamed_masses": can.extensions.streamed_masses,
             "memory_bytes": can.memory_bytes,
             "bytes_per_body": can.bytes_per_body,
             "bytes_per_collision": can.bytes_per_collision,

@@ -21,7 +21,8 @@ const DROP: f32 = 1.0;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
     /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
-    /// of several masses), for which an emulated board has world inertia.
+    /// of several masses), which need a board with world inertia: `pgs run` and `pgs formats` build
+    /// such an emulated board themselves.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]

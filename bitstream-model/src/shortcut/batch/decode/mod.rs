@@ -231,6 +231,7 @@ impl Batch {
         self.bodies = self.bodies.max(bodies);
         self.measured = false;
         self.spins = false;
+        self.gathered = false;
         let mut at = 0;
         while at < count {
             // A group begins at most one block for each of its records.

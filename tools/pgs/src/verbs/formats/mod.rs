@@ -134,9 +134,10 @@ pub(crate) fn run(
 
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
-    let mut opened = board::open(common, &args.build.build())?;
+    let build = args.build.build();
+    let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
-    let mut scene = args.scene.build(&args.build.build())?;
+    let mut scene = args.scene.build(&build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = args.deadline.apply(StepParameters::default());
     let interrupt = Interrupt::install();

@@ -44,7 +44,7 @@ Examples:
   pgs run --order hazard-free --verify
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
-  pgs run --scene shapes --warm-start=false --pair-friction=false     the same on a board of 1.1
+  pgs run --scene shapes --warm-start=false --pair-friction=false     without extensions of 1.2
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
@@ -71,7 +71,7 @@ const ITERATIONS: u32 = 10;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct RunArgs {
-    /// Steps to take [default: 120 of the cubes, 600 of the shapes]
+    /// Steps to take [default: 120 for cubes, 600 for shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
     #[command(flatten)]
@@ -85,16 +85,16 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     solver: SolverArgs,
     /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
-    /// [default: of the shapes, if the board can]
+    /// [default: on for --scene shapes, if the board has the extension]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     warm_start: Option<bool>,
-    /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: of the
-    /// shapes, if the board can]
+    /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on
+    /// for --scene shapes, if the board has the extension]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
-    /// deep its bodies sink and how much they move [default: of the shapes with a warm start, if no
-    /// fault is planned]
+    /// deep its bodies sink and how much they move [default: on for --scene shapes with a warm start,
+    /// unless a fault is planned or --wide is given]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     beside_cold: Option<bool>,
     #[command(flatten)]
@@ -141,6 +141,7 @@ impl RunArgs {
     /// which should then be those of the run.
     fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
+        let shown = shown && !self.wide;
         let wanted = self.beside_cold.unwrap_or(shown);
         let scene = || self.scene.build(&self.build.build());
         wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
@@ -219,9 +220,6 @@ fn take_steps(
                 .step(course.done + 1, &mut opened.accelerator)
                 .map_err(|error| args.faults.failure(opened, parameters, error))?;
             opened.alive()?;
-            if beside.is_none() {
-                break;
-            }
         }
         course.done += 1;
         course.retries += u64::from(row.report.retries);

@@ -178,9 +178,7 @@ impl FinalState {
             self.deepest * 1e3,
         )
     }
-}
 
-impl FinalState {
     pub(super) fn to_json(self) -> Value {
         json!({
             "at_rest": self.is_at_rest(),
