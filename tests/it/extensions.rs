@@ -182,10 +182,10 @@ fn many_shapes() -> Vec<Shape> {
 }
 
 /// The scene whose moving bodies have `shapes` in turn.
-fn with_shapes(seed: u64, shapes: usize) -> (Vec<Body>, Vec<Collision>) {
+fn with_shapes(seed: u64, shapes: u32) -> (Vec<Body>, Vec<Collision>) {
     let (mut bodies, collisions) = scene(seed);
     for (number, body) in (0_u32..).zip(&mut bodies).filter(|(_, body)| body.shape != 0) {
-        body.shape = 1 + 7 * number % (shapes as u32 - 1);
+        body.shape = 1 + 7 * number % (shapes - 1);
     }
     (bodies, collisions)
 }
@@ -195,7 +195,7 @@ fn every_body_can_bring_a_mass_of_its_own() {
     let shapes = many_shapes();
     for kinematic in [false, true] {
         let parameters = ordered(Order::AsGiven).with_kinematic(kinematic);
-        let scene = with_shapes(31, shapes.len());
+        let scene = with_shapes(31, 150);
         let distinct: std::collections::BTreeSet<u32> =
             scene.0.iter().map(|body| body.shape).collect();
         assert!(distinct.len() > 20 && distinct.iter().any(|shape| *shape > 64), "{distinct:?}");
@@ -229,7 +229,7 @@ fn a_streamed_mass_counts_as_one_of_the_table() {
 #[test]
 fn one_board_takes_few_shapes_after_many_and_many_after_few() {
     let many = many_shapes();
-    let (bodies, collisions) = with_shapes(9, many.len());
+    let (bodies, collisions) = with_shapes(9, 150);
     let few_bodies = with_shapes(9, 64).0;
     let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
     let parameters = ordered(Order::AsGiven).with_retries(1);

@@ -361,12 +361,17 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
                 continue;
             }
             let arithmetic = F::arithmetic(instructions);
+            let kept = self.field.kept.map(|kept| {
+                // SAFETY: `kept` has an entry for each block: see `Fronts::run`.
+                let kept = unsafe { kept.add(index as usize) };
+                // SAFETY: the entry belongs to the block, which is the thread's: see `Sync`.
+                unsafe { &mut *kept }
+            });
+            let rows = self.field.rows;
             // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays, and one to
             // spare for each thread. While the thread has the chunk, the rows of its bodies are its own: see
-            // `Sync`. `kept` has an entry for each block (`Fronts::run`), and this one belongs to the block.
+            // `Sync`.
             unsafe {
-                let rows = self.field.rows;
-                let kept = self.field.kept.map(|kept| &mut *kept.add(index as usize));
                 kernel::solve::<_, I>(
                     arithmetic,
                     instructions,

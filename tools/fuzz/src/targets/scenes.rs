@@ -76,7 +76,7 @@ impl Scene {
         if !extensions.streamed_masses || !input.one_in(4) {
             return;
         }
-        let own = self.shapes.len() as u32;
+        let own = u32::try_from(self.shapes.len()).expect("a few");
         self.shapes.extend((own..70).map(|number| Shape::isotropic(1.0 + number as f32, 1.5)));
         for body in self.bodies.iter_mut().filter(|body| (1..own).contains(&body.shape)) {
             if input.one_in(2) {
