@@ -171,8 +171,7 @@ fn a_profile_without_an_extension_names_the_ones_that_have_it() {
     }
 }
 
-/// A hundred and fifty shapes, more than the table has entries: a static one, and as many masses and
-/// inertias as moving ones.
+/// A static shape and 149 moving ones, each of another mass and inertia. The table has 64 entries.
 fn many_shapes() -> Vec<Shape> {
     let moving = (1..150_u8).map(f32::from).map(|number| Shape {
         inverse_mass: 0.25 + number / 64.0,

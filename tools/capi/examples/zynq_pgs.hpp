@@ -67,7 +67,7 @@ public:
         return report;
     }
 
-    // Stores the impulses of the last step, as many as it had collisions.
+    // Stores the impulses of the last step. `impulses` has one element for each collision of that step.
     void read_impulses(std::vector<zpgs_impulses> &impulses) {
         const zpgs_strided array = {impulses.data(), sizeof(zpgs_impulses)};
         check(zpgs_read_impulses(handle_, array, impulses.size()));

@@ -153,7 +153,7 @@ void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactS
     }
 }
 
-// The collision of this manifold that takes the point: one of those from `first` on, or a new one.
+// The collision of this manifold that takes the point: a known one from number `first` on, or a new one.
 size_t ZynqPgsGather::collisionOf(btPersistentManifold *manifold, const btManifoldPoint &point, size_t first,
                                   const btContactSolverInfo &info) {
     const int points = std::max(1, std::min(m_pointsPerCollision, ZPGS_CONTACT_POINTS));

@@ -197,8 +197,8 @@ unsafe fn side<A: Arithmetic, F: Form>(
     let k = match kept {
         Some(kept) if F::ABOUT_AXES => {
             if gathers {
-                // SAFETY: the caller promises that `rows.inertias` has a row for each index, and that no
-                // other thread writes it.
+                // SAFETY: `gathers` is set and `kept` receives: the caller promises that `rows.inertias` then has
+                // a row for each index, and that no thread writes these rows during the call.
                 kept.put(unsafe { gathered(instructions, rows.inertias, indices) });
             }
             kept.of::<A, F>(arithmetic)
@@ -259,13 +259,13 @@ pub(crate) unsafe fn solve<A: Arithmetic, F: Form>(
     let moves = kind::MOVES.map(|bit| tested(block, bit));
     let counts = F32x16::from_fn(|lane| (block.kind[lane] & kind::COUNT) as f32);
     let counts = arithmetic.of(counts);
-    // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
-    // other thread writes them.
+    // SAFETY: the caller promises that the rows of side A exist in `rows.bodies`, and in a form about axes in
+    // `rows.inertias`, too, and that no other thread writes them during the call.
     let mut a = unsafe {
         side::<A, F>(arithmetic, instructions, rows, &block.rows[0], (kept_a, pass.gathers))
     };
-    // SAFETY: the caller promises that the block's rows exist in the arrays that the form reads, and that no
-    // other thread writes them.
+    // SAFETY: the caller promises that the rows of side B exist in `rows.bodies`, and in a form about axes in
+    // `rows.inertias`, too, and that no other thread writes them during the call.
     let mut b = unsafe {
         side::<A, F>(arithmetic, instructions, rows, &block.rows[1], (kept_b, pass.gathers))
     };

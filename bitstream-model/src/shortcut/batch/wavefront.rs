@@ -152,9 +152,9 @@ struct Field<'a> {
     alone: bool,
 }
 
-// SAFETY: blocks, their kept inertias and rows are accessed in `chunk` alone, for the next chunk of a pass that one thread
-// has taken. The chunks of the pass before over the same bodies or blocks have ended, and so have this
-// pass's earlier chunks: `progress` tells it with release and acquire.
+// SAFETY: blocks, their kept inertias and rows are accessed in `chunk` alone, for the next chunk of a pass
+// that one thread has taken. The chunks of the pass before over the same bodies or blocks have ended, and so
+// have the earlier chunks of this pass: `progress` tells it with release and acquire.
 unsafe impl Sync for Field<'_> {}
 
 /// Marks the field as broken when dropped, unless it was cleared before.
@@ -350,7 +350,7 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
             }
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
-            // SAFETY: and this one is the thread's: see `Sync`.
+            // SAFETY: the block is in a chunk that this thread alone has: see `Sync`.
             let block = unsafe { &mut *block };
             let given = self.field.given::<WARM>(index);
             if block.serial() {
@@ -362,9 +362,11 @@ impl<F: Computed, I: Form, const WARM: bool> Work for ChunkWork<'_, F, I, WARM> 
             }
             let arithmetic = F::arithmetic(instructions);
             let kept = self.field.kept.map(|kept| {
-                // SAFETY: `kept` has an entry for each block: see `Fronts::run`.
+                // SAFETY: `order` has numbers of blocks, and `kept` has an entry for each block: `Fronts::run`
+                // takes the pointer only if both lengths are equal.
                 let kept = unsafe { kept.add(index as usize) };
-                // SAFETY: the entry belongs to the block, which is the thread's: see `Sync`.
+                // SAFETY: only the thread that has the chunk of a block accesses the entry of this block: see
+                // `Sync`.
                 unsafe { &mut *kept }
             });
             let rows = self.field.rows;
@@ -394,7 +396,7 @@ impl<F: Computed, I: Form, const WARM: bool> ChunkWork<'_, F, I, WARM> {
         for &index in self.blocks {
             // SAFETY: `order` has numbers of blocks.
             let block = unsafe { self.field.blocks.add(index as usize) };
-            // SAFETY: and this one is the thread's: see `Sync`.
+            // SAFETY: the block is in a chunk that this thread alone has: see `Sync`.
             let block = unsafe { &mut *block };
             let given = self.field.given::<WARM>(index);
             // SAFETY: `Batch::enter` has made a row for every body, with world inertia in both arrays; while the thread

@@ -137,8 +137,8 @@ impl RunArgs {
         self.steps.unwrap_or(if self.scene.is_cubes() { cubes } else { shapes })
     }
 
-    /// The scene that is stepped beside this one, if one is. A planned fault counts the steps of the board,
-    /// which should then be those of the run.
+    /// The scene that is stepped beside this one, if one is. A planned fault names a step of the board
+    /// by its number, and the steps of a second scene would shift the numbers.
     fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
         let shown = shown && !self.wide;
