@@ -32,13 +32,14 @@ mod fixtures;
 mod geometry;
 mod grid;
 mod measure;
+mod poses;
 mod random;
 mod rotation;
 mod shapes;
 mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
-pub use detect::MARGIN;
+pub use detect::{BroadPhase, DetectionTimes, MARGIN};
 pub use error::SceneError;
 pub use geometry::Geometry;
 pub use grid::Grid;

@@ -121,6 +121,11 @@ impl Broad {
         &self.candidates
     }
 
+    /// The candidates of the last search.
+    pub(super) fn kept(&self) -> &[(u32, u32)] {
+        &self.candidates
+    }
+
     /// Searches for candidates.
     fn search(&mut self, bounds: &[Bounds], crew: &mut Crew) {
         #[cfg(test)]
@@ -202,6 +207,7 @@ fn sort_few(pairs: &mut [(u32, u32)]) {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::sweep::Sweep;
     use super::*;
 
     /// A change of a body from one step to the next.
@@ -239,10 +245,13 @@ mod tests {
             for (before, now) in self.broad.searched_bounds(bounds.len()).iter().zip(bounds) {
                 drift.add(before, now);
             }
-            let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
-            let candidates = self.broad.candidates(bounds, &drift, &mut self.crew);
-            candidates.iter().filter(near).copied().collect()
+            near(bounds, self.broad.candidates(bounds, &drift, &mut self.crew))
         }
+    }
+
+    fn near(bounds: &[Bounds], candidates: &[(u32, u32)]) -> Vec<(u32, u32)> {
+        let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
+        candidates.iter().filter(near).copied().collect()
     }
 
     fn every_pair(bounds: &[Bounds]) -> Vec<(u32, u32)> {
@@ -267,7 +276,7 @@ mod tests {
         ) {
             let mut bounds = vec![Bounds::NONE];
             bounds.extend(bodies.into_iter().map(|(centre, reach)| Bounds { centre, reach }));
-            let mut kept = Kept::default();
+            let (mut kept, mut sweep) = (Kept::default(), Sweep::default());
             for (fall, events) in steps {
                 for body in &mut bounds {
                     body.centre = std::array::from_fn(|axis| body.centre[axis] + fall[axis]);
@@ -293,7 +302,9 @@ mod tests {
                         Event::Turn(_) => {}
                     }
                 }
-                prop_assert_eq!(kept.pairs(&bounds), every_pair(&bounds));
+                let expected = every_pair(&bounds);
+                prop_assert_eq!(kept.pairs(&bounds), &*expected);
+                prop_assert_eq!(near(&bounds, sweep.candidates(&bounds)), expected);
             }
         }
     }
