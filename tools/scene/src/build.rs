@@ -1,9 +1,9 @@
 //! Builds the scene and holds its bodies and collisions.
 
 use pgs_support::float_env::standard;
-use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
+use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-use crate::detect::{BroadPhase, DetectionTimes, Detector, Geometries};
+use crate::detect::{self, BroadPhase, DetectionTimes, Detector, Geometries};
 use crate::{CUBE_HALF_EXTENT, GROUND, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
@@ -199,6 +199,13 @@ impl Scene {
     /// list is sorted, and the ground has no part in it.
     pub fn pairs(&self) -> impl Iterator<Item = (u32, u32)> {
         self.detector.pairs()
+    }
+
+    /// All contact points of two bodies, on the surface of `b`: [`detect`](Self::detect) chooses
+    /// up to four of them. None if the pair is none of its kind: the ground, body 0, can only be `a`.
+    #[must_use]
+    pub fn all_points(&self, a: u32, b: u32) -> Option<Vec<Contact>> {
+        standard(|| detect::all_points(&self.bodies, Geometries(&self.geometries), a, b))
     }
 
     /// Gives each collision a friction of its own from now on: the geometric mean of the frictions of

@@ -44,7 +44,7 @@ pub use error::SceneError;
 pub use geometry::Geometry;
 pub use grid::Grid;
 pub use measure::{
-    KineticEnergy, Momentum, Penetration, carry_along, ground_pairs, kinetic_energy,
+    KineticEnergy, Momentum, Penetration, axes, carry_along, ground_pairs, kinetic_energy,
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };

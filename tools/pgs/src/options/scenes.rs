@@ -5,6 +5,7 @@ use bitstream_model::interface::profile::Inertia as Form;
 use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
+use step_folder::npy;
 use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
 
@@ -68,6 +69,19 @@ fn drop_height(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Refuses a grid that no board takes, before memory is allocated for it.
+pub(crate) fn check_rows(grid: Grid) -> Result<(), Failure> {
+    let bodies = u64::from(grid.cubes()) + 1;
+    if bodies <= npy::ROWS_MAX as u64 {
+        return Ok(());
+    }
+    let error = format!(
+        "a grid of {grid} is {bodies} bodies with the ground, no board takes more than {}",
+        npy::ROWS_MAX
+    );
+    Err(Failure::input(error).next("give a smaller --grid"))
+}
+
 impl SceneArgs {
     /// Builds the scene. Detection uses as many threads as the emulated board may.
     pub(crate) fn build(&self, board: &Build) -> Result<Scene, Failure> {
@@ -89,7 +103,8 @@ impl SceneArgs {
         Ok(scene)
     }
 
-    fn grid(&self) -> Grid {
+    /// Bodies along each axis.
+    pub(crate) fn grid(&self) -> Grid {
         let shapes = || Grid::new(10, 10, 10).unwrap_or_default();
         self.grid.unwrap_or_else(|| if self.is_cubes() { Grid::default() } else { shapes() })
     }

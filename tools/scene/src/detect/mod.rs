@@ -8,6 +8,7 @@ mod bounds;
 mod boxes;
 mod broad;
 mod cells;
+mod choice;
 mod ground;
 mod lanes;
 mod narrow;
@@ -25,6 +26,7 @@ use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};
 use broad::{Broad, Drift};
+pub(crate) use choice::all_points;
 use narrow::Narrow;
 use sweep::Sweep;
 
