@@ -56,6 +56,15 @@ pub(super) fn separation(a: &Cube, b: &Cube, normal: Vector) -> f64 {
     dot(normal, minus(a.centre, b.centre)) - a.reach(normal) - b.reach(normal)
 }
 
+/// The largest gap between two cubes along the face normals of `of`.
+pub(super) fn separation_by_faces(of: &Cube, a: &Cube, b: &Cube) -> f64 {
+    let towards_a = |axis: Vector| {
+        let is_turned = dot(axis, minus(a.centre, b.centre)) < 0.0;
+        if is_turned { axis.map(|value| -value) } else { axis }
+    };
+    of.axes.map(|axis| separation(a, b, towards_a(axis))).into_iter().fold(f64::MIN, f64::max)
+}
+
 /// The corners of the face of `b` that looks along the normal, cut by the sides of the face of `a`
 /// that looks against it.
 pub(super) fn clipped(a: &Cube, b: &Cube, normal: Vector) -> Vec<Vector> {
@@ -137,6 +146,9 @@ mod tests {
         near(separation(&lower, &cube([0.5, 1.75, 0.0]), down), -0.25);
         let slanted = [0.0, -0.5_f64.sqrt(), -0.5_f64.sqrt()];
         near(separation(&lower, &cube([0.0, 2.0, 2.0]), slanted), 0.0);
+        let upper = cube([0.5, 2.25, 0.0]);
+        near(separation_by_faces(&lower, &lower, &upper), 0.25);
+        near(separation_by_faces(&lower, &upper, &lower), 0.25);
     }
 
     #[test]

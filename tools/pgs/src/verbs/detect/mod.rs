@@ -42,8 +42,8 @@ velocities for one time step, with its lists kept. Both must find one list of pa
 pair deeper than 1 mm is missing or extra. Every normal more than 0.01 degrees off and every point
 more than 1 mm off is counted under its cause:
 
-  apart     the cubes are apart along our axis, which is a face's, and overlap more along the
-            folder's, or are less far apart
+  apart     the cubes are apart along a face of B and along none of A; the folder's axis is across
+            two edges. Bullet's kernel (sat.cl) leaves the faces of such a pair and tries its edges
   equal     along both axes the cubes overlap equally, within 0.1 mm
   choice    the point is one of ours, before four of them are chosen
   clip      the folder's point is a corner of B's face cut by the sides of A's face; ours is cut

@@ -37,7 +37,7 @@ impl NormalCause {
     const fn text(self) -> &'static str {
         match self {
             Self::Same => "same: within 0.01 degrees",
-            Self::Apart => "apart: cubes apart along our face's normal",
+            Self::Apart => "apart: by a face of B alone, theirs by edges",
             Self::Equal => "equal: equal overlap along both axes",
             Self::Unknown => "unknown",
         }

@@ -90,7 +90,7 @@ mod tests {
         let grid = "4x4x4".parse().expect("a grid");
         let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).expect("a scene");
-        scene.bodies_mut()[5].velocity.linear = [30.0, 0.0, 0.0];
+        scene.bodies_mut()[5].velocity.linear = [0.0, 300.0, 0.0];
         let before = scene.bodies().to_vec();
         let measured = [BroadPhase::Grid, BroadPhase::Sweep]
             .map(|broad_phase| Timing::measure(&mut scene, broad_phase, 0.1, 3));
