@@ -16,7 +16,8 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
-//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
+//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes, capsules, cylinders and convex hulls of
+//! several masses instead, and [`Scene::of_cubes`] has any poses.
 //! [`Spheres`] is an irregular pile, for tests of the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
@@ -31,6 +32,7 @@ mod error;
 mod fixtures;
 mod geometry;
 mod grid;
+mod hull;
 mod measure;
 mod poses;
 mod random;

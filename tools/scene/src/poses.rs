@@ -44,8 +44,9 @@ fn check_poses(bodies: &[Body]) -> Result<(), SceneError> {
         }
         let [x, y, z, w] = pose.orientation;
         let length = (((x * x + y * y) + z * z) + w * w).sqrt();
-        // In this form a NaN is refused.
-        if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+        // False for a NaN.
+        let is_unit = (length - 1.0).abs() <= UNIT_TOLERANCE;
+        if !is_unit {
             return refused("an orientation of length 1", &pose.orientation);
         }
     }

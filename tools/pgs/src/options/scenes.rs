@@ -21,9 +21,9 @@ const DROP: f32 = 1.0;
 /// The scene and its size.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
-    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
-    /// of several masses), which need a board with world inertia: `pgs run` and `pgs formats` build
-    /// such an emulated board themselves.
+    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules,
+    /// cylinders, convex hulls of several masses), which need a board with world inertia: `pgs run`
+    /// and `pgs formats` build such an emulated board themselves.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]
@@ -160,7 +160,7 @@ impl SceneArgs {
         let what = match self.scene {
             SceneName::Cubes => format!("cubes ({grid})"),
             SceneName::Shapes => {
-                format!("cubes, spheres, boxes and capsules ({grid}, seed {})", self.seed())
+                format!("bodies of six shapes ({grid}, seed {})", self.seed())
             }
         };
         let count = grouped(grid.cubes().into());

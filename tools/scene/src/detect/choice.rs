@@ -47,10 +47,11 @@ mod tests {
         let grid = "3x3x3".parse().expect("a grid");
         let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).expect("a scene");
-        // Turned by 45 degrees, the faces overlap in octagons.
-        for body in scene.bodies_mut()[1..].iter_mut().step_by(3) {
-            body.pose.orientation = [0.0, 0.382_683_43, 0.0, 0.923_879_5];
-        }
+        // A cube right above another and turned by 45 degrees: the faces overlap in an octagon.
+        let [x, y, z] = scene.bodies()[1].pose.position;
+        let turned = &mut scene.bodies_mut()[4].pose;
+        turned.position = [x, y + 2.0, z];
+        turned.orientation = [0.0, 0.382_683_43, 0.0, 0.923_879_5];
         let mut most = 0;
         for collision in scene.detect().to_vec() {
             let all = scene.all_points(collision.body_a, collision.body_b).expect("a pair");

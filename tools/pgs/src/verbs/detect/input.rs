@@ -105,8 +105,9 @@ impl Input {
             };
             let [x, y, z] = found.normal;
             let length = ((x * x + y * y) + z * z).sqrt();
-            // In this form a NaN is refused.
-            if !used.is_empty() && !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+            // False for a NaN.
+            let is_unit = (length - 1.0).abs() <= UNIT_TOLERANCE;
+            if !used.is_empty() && !is_unit {
                 let problem = Problem::Normal { collision, found: found.normal };
                 return refused(COLLISION_NORMAL, problem);
             }
