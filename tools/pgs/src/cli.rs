@@ -169,6 +169,7 @@ mod tests {
             "pgs solve x --memory uio --board uio",
             "pgs model",
             "pgs load x",
+            "pgs detect --input x",
         ] {
             parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
         }

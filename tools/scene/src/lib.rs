@@ -30,6 +30,7 @@ mod detect;
 mod error;
 #[cfg(test)]
 mod fixtures;
+mod frames;
 mod geometry;
 mod grid;
 mod hull;
@@ -43,6 +44,7 @@ mod spheres;
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
 pub use detect::{BroadPhase, DetectionTimes, MARGIN};
 pub use error::SceneError;
+pub use frames::{StepClock, interpolate};
 pub use geometry::Geometry;
 pub use grid::Grid;
 pub use measure::{

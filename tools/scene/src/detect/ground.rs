@@ -254,7 +254,8 @@ mod tests {
             "{lying:?}"
         );
         // Tilted by 30 degrees, one way and head down: on the lowest point of a rim.
-        for angle in [0.523_598_8, -0.523_598_8, 3.665_191_4] {
+        let tilt = std::f32::consts::FRAC_PI_6;
+        for angle in [tilt, -tilt, std::f32::consts::PI + tilt] {
             let height = 0.6 * 0.866_025_4 + 0.4 * 0.5;
             let tilted = found(height - 0.005, angle).expect("contact");
             assert_eq!(tilted.count, 1, "{tilted:?}");
