@@ -11,7 +11,8 @@ const UNIT_TOLERANCE: f32 = 1e-3;
 
 impl Scene {
     /// Builds a scene of cubes from bodies with any poses and velocities. Body 0 is the ground; the
-    /// others get the shape of [`SceneOptions::default`], whatever theirs is.
+    /// others get the shape of [`SceneOptions::default`](crate::SceneOptions::default), whatever
+    /// theirs is.
     ///
     /// # Errors
     /// [`SceneError::Ground`] if body 0 is not where the ground is; [`SceneError::Pose`] if a

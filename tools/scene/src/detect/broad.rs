@@ -24,6 +24,16 @@ const _: () = assert!(GAP + SKIN <= GAP_MAX, "candidates are in neighbouring cel
 /// Smallest number of bodies for which a further thread speeds up the search.
 const SEARCHED_PER_THREAD: usize = 2048;
 
+/// The way in which pairs of bodies that may touch are found. Both ways find the same pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BroadPhase {
+    /// A grid of cells.
+    #[default]
+    Grid,
+    /// Sweep and prune, as the thesis describes it (section 2.2.1), on the calling thread alone.
+    Sweep,
+}
+
 /// The range of the bodies' movement and growth, along each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Drift {

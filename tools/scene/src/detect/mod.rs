@@ -25,6 +25,7 @@ use pgs_support::Crew;
 use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};
+pub use broad::BroadPhase;
 use broad::{Broad, Drift};
 pub(crate) use choice::all_points;
 use narrow::Narrow;
@@ -43,16 +44,6 @@ const PAIRS_PER_THREAD: usize = 4096;
 const THREADS_UNASKED: usize = 8;
 /// Smallest number of bodies for which threads are started.
 const BODIES_FOR_THREADS: usize = 1024;
-
-/// The way in which pairs of bodies that may touch are found. Both ways find the same pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum BroadPhase {
-    /// A grid of cells.
-    #[default]
-    Grid,
-    /// Sweep and prune, as the thesis describes it (section 2.2.1), on the calling thread alone.
-    Sweep,
-}
 
 /// The time of each part of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
