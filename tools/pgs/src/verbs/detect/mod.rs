@@ -48,9 +48,9 @@ more than 1 mm off is counted under its cause:
   choice    the point is one of ours, before four of them are chosen
   clip      the folder's point is a corner of B's face cut by the sides of A's face; ours is cut
             along the normal. Bullet cuts so
-  first     the first point of the collision is no corner of the contact area, the others are.
-            Bullet's kernels (sat.cl, mpr.cl) put the point of their portal refinement (MPR) in
-            place of the first corner
+  first     the first point of the collision is none of these. Bullet's kernel of contacts
+            (satClipHullContacts.cl) puts the point of a portal refinement (MPR) in place of the
+            first corner
   normal    the point belongs to a collision whose normal differs, too
   unknown   none of these";
 
