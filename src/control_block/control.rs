@@ -62,6 +62,7 @@ fn flags_of(arguments: &StepArguments<'_>) -> u32 {
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
+    let word = flags::SHAPE_FRICTION.put(word, parameters.shape_friction.into());
     let word = flags::WARM_START.put(word, parameters.warm_start.into());
     let word = flags::IMPULSES_OUT.put(word, parameters.impulses_out.into());
     let word = flags::STREAMED_MASSES.put(word, streamed_masses.into());
@@ -174,6 +175,7 @@ mod tests {
         assert_eq!(word(StepParameters::default()), 0b001);
         assert_eq!(word(none.with_kinematic(true)), 0b010);
         assert_eq!(word(none.with_pair_friction(true)), 0b100);
+        assert_eq!(word(none.with_shape_friction(true)), 0b1000_0000);
         let masses = StepArguments { streamed_masses: true, ..step(&none) };
         assert_eq!(flags_of(&masses), 0b010_0000);
         let velocities = StepArguments { velocities_only: true, ..step(&none) };

@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const BOX: Shape = Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 4.0] };
+    const BOX: Shape = Shape { inverse_inertia: [1.0, 2.0, 4.0], ..Shape::isotropic(1.0, 0.0) };
 
     #[test]
     fn an_unturned_body_has_its_own_axes() {

@@ -17,7 +17,7 @@ pub struct ShapeError {
     pub found: f32,
 }
 
-/// Mass properties shared by bodies.
+/// Mass properties and friction shared by bodies.
 ///
 /// The axes of the inertia are the body's axes: its orientation turns them into the world.
 ///
@@ -38,16 +38,20 @@ pub struct Shape {
     /// Diagonal of the inverse inertia about the body's axes, 1/(kg m²). Unless the three are equal
     /// the shape needs a bitstream with world inertia.
     pub inverse_inertia: [f32; 3],
+    /// Friction of the shape. It counts in steps with
+    /// [`StepParameters::shape_friction`](crate::StepParameters::shape_friction) alone.
+    pub friction: f32,
 }
 
 impl Shape {
     /// A shape that never moves.
-    pub const STATIC: Self = Self { inverse_mass: 0.0, inverse_inertia: [0.0; 3] };
+    pub const STATIC: Self = Self::isotropic(0.0, 0.0);
 
-    /// A shape whose inertia is the same about every axis (cube, sphere).
+    /// A shape whose inertia is the same about every axis (cube, sphere). As of every constructor, its friction
+    /// is 1.
     #[must_use]
     pub const fn isotropic(inverse_mass: f32, inverse_inertia: f32) -> Self {
-        Self { inverse_mass, inverse_inertia: [inverse_inertia; 3] }
+        Self { inverse_mass, inverse_inertia: [inverse_inertia; 3], friction: 1.0 }
     }
 
     /// A solid box of uniform density: I.x = m (h.y² + h.z²) / 3, and likewise for y and z.
@@ -167,7 +171,14 @@ impl Shape {
             let (parameter, found) = sizes[0];
             return Err(ShapeError { parameter, found });
         }
-        Ok(Self { inverse_mass, inverse_inertia })
+        Ok(Self { inverse_inertia, ..Self::isotropic(inverse_mass, 0.0) })
+    }
+
+    /// The shape with a friction. The friction of a collision is the product of both shapes' frictions: roots
+    /// of two materials' coefficients give their geometric mean.
+    #[must_use]
+    pub const fn with_friction(self, friction: f32) -> Self {
+        Self { friction, ..self }
     }
 
     /// Whether the inertia is the same about every axis.

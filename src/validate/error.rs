@@ -325,7 +325,19 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// An inverse mass or inertia is negative, subnormal or not finite.
+    /// The masses of this number of shapes are streamed, and their frictions cannot be.
+    #[error(
+        "the step wants a friction for each of {found} shapes, and the bitstream's table has {limit} \
+         entries: give fewer shapes, or clear `StepParameters::shape_friction`"
+    )]
+    FrictionsBeyondTable {
+        /// Shapes given.
+        found: usize,
+        /// Entries of the table.
+        limit: u32,
+    },
+
+    /// An inverse mass, an inertia or a friction is negative, subnormal or not finite.
     #[error(
         "shape {shape}: its {field}[{component}] is {found:e}, expected 0 or a finite number of at \
          least {limit:e}: correct it",

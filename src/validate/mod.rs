@@ -160,6 +160,10 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     if needs.bodies > 0 {
         check_room(&needs, limits)?;
         check_shapes(shapes, &needs, limits)?;
+        let (found, limit) = (shapes.len(), limits.shape_capacity);
+        if parameters.shape_friction && exceeds(found, limit) {
+            return Err(InputError::FrictionsBeyondTable { found, limit });
+        }
     }
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;
@@ -506,7 +510,10 @@ pub(crate) mod tests {
     /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them.
     #[test]
     fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
-        let shapes = [Shape::STATIC, Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 2.0, 3.0] }];
+        let shapes = [
+            Shape::STATIC,
+            Shape { inverse_inertia: [1.0, 2.0, 3.0], ..Shape::isotropic(1.0, 0.0) },
+        ];
         let collisions = vec![collision(0, 1); 300_000];
         let limits = Limits { memory_bytes: 8 << 20, collision_capacity: 524_288, ..FLOAT };
         let parameters = StepParameters::default();

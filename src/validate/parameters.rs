@@ -57,6 +57,7 @@ pub(crate) fn check_parameters(
     let asked = [
         ("static bodies that move", parameters.kinematic, (|of| of.kinematic) as Has),
         ("a friction for each collision", parameters.pair_friction, |of| of.pair_friction),
+        ("a friction for each shape", parameters.shape_friction, |of| of.shape_friction),
         ("a warm start", parameters.warm_start, |of| of.warm_start),
         ("the impulses of the collisions", parameters.impulses_out, |of| of.warm_start),
     ];

@@ -9,6 +9,7 @@ use crate::scene::Shape;
 
 const MASS: &str = "inverse mass";
 const INERTIA: &str = "inverse inertia";
+const FRICTION: &str = "friction";
 
 /// Checks a shape table before any scene uses it.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
@@ -38,9 +39,16 @@ pub(crate) fn check_shapes(
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
         let [x, y, z] = shape.inverse_inertia;
-        let fields =
-            [(MASS, 0, shape.inverse_mass), (INERTIA, 0, x), (INERTIA, 1, y), (INERTIA, 2, z)];
-        for (field, component, found) in fields {
+        let fields = [
+            (MASS, 0, shape.inverse_mass),
+            (INERTIA, 0, x),
+            (INERTIA, 1, y),
+            (INERTIA, 2, z),
+            (FRICTION, 0, shape.friction),
+        ];
+        // A friction is not streamed, and a bitstream without frictions ignores it.
+        let fields = &fields[..if limits.extensions.shape_friction { 5 } else { 4 }];
+        for (field, component, found) in fields.iter().copied() {
             if !usable(found) {
                 return Err(InputError::ShapeValue { shape: index, field, component, found });
             }
@@ -62,7 +70,7 @@ pub(crate) fn check_shapes(
             };
             (!fits).then_some(format)
         };
-        for (field, component, found) in fields {
+        for (field, component, found) in fields.iter().copied() {
             if let Some(format) = beyond(field, found, &limits.variant) {
                 let (item, largest) = (InputItem::Shape(index), format.largest());
                 let number =
@@ -216,7 +224,7 @@ mod tests {
 
     #[test]
     fn an_inertia_that_is_streamed_must_fit_stream_and_array() {
-        let shape = Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 7e4, 1.0] };
+        let shape = Shape { inverse_inertia: [1.0, 7e4, 1.0], ..Shape::isotropic(1.0, 1.0) };
         let text = out_of_range(shape, &on(HALF.variant.profile, Inertia::World));
         assert!(text.contains("inverse inertia[1] is 7e4") && text.contains("65504"), "{text}");
         assert!(
@@ -231,6 +239,21 @@ mod tests {
         let mut table = FLOAT;
         table.variant.numbers.velocities = Precision::Binary16;
         assert_eq!(validate_shapes(&[Shape::isotropic(1.0, 7e4)], &table), Ok(()));
+    }
+
+    #[test]
+    fn a_friction_counts_where_the_table_has_it() {
+        let shape = |friction| Shape::isotropic(1.0, 1.5).with_friction(friction);
+        assert_eq!(validated(&[shape(f32::NAN)]), Ok(()));
+        let with_frictions = Limits { extensions: Extensions::ALL, ..HALF };
+        for found in [-0.5, f32::NAN, f32::INFINITY] {
+            assert!(matches!(
+                validate_shapes(&[shape(found)], &with_frictions),
+                Err(InputError::ShapeValue { shape: 0, field: "friction", .. })
+            ));
+        }
+        assert_eq!(validate_shapes(&[shape(0.0), shape(0.7)], &with_frictions), Ok(()));
+        assert!(out_of_range(shape(7e4), &with_frictions).contains("friction[0] is 7e4"));
     }
 
     #[test]

@@ -174,8 +174,8 @@ fn a_profile_without_an_extension_names_the_ones_that_have_it() {
 /// A static shape and 149 moving ones, each of another mass and inertia. The table has 64 entries.
 fn many_shapes() -> Vec<Shape> {
     let moving = (1..150_u8).map(f32::from).map(|number| Shape {
-        inverse_mass: 0.25 + number / 64.0,
         inverse_inertia: [1.0, 1.5, 2.0].map(|k| k + number / 32.0),
+        ..Shape::isotropic(0.25 + number / 64.0, 0.0)
     });
     std::iter::once(Shape::STATIC).chain(moving).collect()
 }

@@ -25,6 +25,7 @@ mod prepared;
 mod profiles;
 mod refusals;
 mod served;
+mod shape_friction;
 mod shapes;
 mod storage;
 mod warm_start;

@@ -43,8 +43,10 @@ fn rows<const N: usize>(folder: &Path, name: &str) -> Vec<[f32; N]> {
 pub(crate) fn load(folder: &Path) -> Step {
     let masses = rows::<1>(folder, "body_inv_mass.npy");
     let inertia = rows::<3>(folder, "body_inv_inertia.npy");
-    let of =
-        |index: usize| Shape { inverse_mass: masses[index][0], inverse_inertia: inertia[index] };
+    let of = |index: usize| Shape {
+        inverse_inertia: inertia[index],
+        ..Shape::isotropic(masses[index][0], 0.0)
+    };
     let moving = masses.iter().position(|mass| mass[0] != 0.0).expect("something moves");
     let shapes = vec![Shape::STATIC, of(moving)];
     let positions = rows::<3>(folder, "body_pos.npy");

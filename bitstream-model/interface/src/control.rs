@@ -67,6 +67,10 @@ pub mod flags {
     /// Without [`INTEGRATE`], no poses come in, and the results are velocities alone; with it, this bit has no
     /// effect. Only in a bitstream with [`features::VELOCITIES_ONLY`](super::features::VELOCITIES_ONLY).
     pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 6, Access::ReadWrite);
+    /// The friction of a collision is the product of both shapes' frictions, and FRICTION is not used. Without
+    /// effect beside [`STREAMED_MASSES`], whose steps use no shapes. Only in a bitstream with
+    /// [`features::SHAPE_FRICTION`](super::features::SHAPE_FRICTION).
+    pub const SHAPE_FRICTION: Field = Field::bit("shape_friction", 7, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -109,6 +113,8 @@ pub mod features {
     /// A step that integrates nothing can do without poses
     /// ([`flags::VELOCITIES_ONLY`](super::flags::VELOCITIES_ONLY)).
     pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 10, Access::ReadOnly);
+    /// Each shape can have a friction ([`flags::SHAPE_FRICTION`](super::flags::SHAPE_FRICTION)).
+    pub const SHAPE_FRICTION: Field = Field::bit("shape_friction", 11, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -284,6 +290,7 @@ pub const FLAGS: Register = row(
         flags::IMPULSES_OUT,
         flags::STREAMED_MASSES,
         flags::VELOCITIES_ONLY,
+        flags::SHAPE_FRICTION,
     ],
     OURS,
 );
@@ -351,6 +358,7 @@ pub const FEATURES: Register = read_only(
         features::WARM_START,
         features::STREAMED_MASSES,
         features::VELOCITIES_ONLY,
+        features::SHAPE_FRICTION,
     ],
 );
 /// Numbers of streams.
@@ -456,6 +464,8 @@ pub const SHAPE_INVERSE_MASS: u32 = 0x0;
 /// Offset in an entry of the isotropic inverse inertia, 1/(kg m²), f32; without meaning to a
 /// bitstream with world inertia. The rest of the entry is reserved and written 0.
 pub const SHAPE_INVERSE_INERTIA: u32 = 0x4;
+/// Offset of the friction in an entry, f32. Only in a bitstream with [`features::SHAPE_FRICTION`].
+pub const SHAPE_FRICTION: u32 = 0x8;
 
 /// Every register outside the shape table, by offset.
 pub const REGISTERS: &[Register] = &[

@@ -22,6 +22,8 @@ pub struct Extensions {
     pub streamed_masses: bool,
     /// A step that integrates nothing can do without poses: none come in, and velocities alone go out.
     pub velocities_only: bool,
+    /// Each shape can have a friction; the friction of a collision is the product of two.
+    pub shape_friction: bool,
 }
 
 impl Extensions {
@@ -33,6 +35,7 @@ impl Extensions {
         warm_start: false,
         streamed_masses: false,
         velocities_only: false,
+        shape_friction: false,
     };
     /// All of this version.
     pub const ALL: Self = Self {
@@ -42,6 +45,7 @@ impl Extensions {
         warm_start: true,
         streamed_masses: true,
         velocities_only: true,
+        shape_friction: true,
     };
 
     /// The extensions that the FEATURES register reports.
@@ -54,6 +58,7 @@ impl Extensions {
             warm_start: features::WARM_START.is_set(features),
             streamed_masses: features::STREAMED_MASSES.is_set(features),
             velocities_only: features::VELOCITIES_ONLY.is_set(features),
+            shape_friction: features::SHAPE_FRICTION.is_set(features),
         }
     }
 
@@ -67,6 +72,7 @@ impl Extensions {
             | bit(features::WARM_START, self.warm_start)
             | bit(features::STREAMED_MASSES, self.streamed_masses)
             | bit(features::VELOCITIES_ONLY, self.velocities_only)
+            | bit(features::SHAPE_FRICTION, self.shape_friction)
     }
 
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
@@ -74,23 +80,26 @@ impl Extensions {
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
     /// Impulses need passes one after the other, and a stripe for their records. A streamed mass needs the
     /// rows of a world inertia beside it, and an array of numbers for all bodies. Velocities go out alone
-    /// where they are on chip together.
+    /// where they are on chip together. The shapes have a friction where the collisions have no room for
+    /// one, and where static bodies have records: these name their shapes.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, inertia } = variant;
         let absolute = matches!(profile.geometry, Geometry::Absolute);
+        let pair_friction = absolute && matches!(numbers.collisions, StreamFormat::F32);
         Self {
             spin_damping: true,
             kinematic: matches!(profile.flow, Flow::Passes)
                 && absolute
                 && !matches!(numbers.bodies, StreamFormat::Thesis16),
-            pair_friction: absolute && matches!(numbers.collisions, StreamFormat::F32),
+            pair_friction,
             warm_start: profile.stripes.warm_collisions.is_some()
                 && matches!(numbers.collisions, StreamFormat::F32),
             streamed_masses: matches!(inertia, Inertia::World)
                 && matches!(profile.flow, Flow::Passes)
                 && matches!(numbers.bodies, StreamFormat::F32),
             velocities_only: matches!(profile.flow, Flow::Passes),
+            shape_friction: !pair_friction && matches!(profile.flow, Flow::Passes),
         }
     }
 
@@ -104,6 +113,7 @@ impl Extensions {
             warm_start: self.warm_start && other.warm_start,
             streamed_masses: self.streamed_masses && other.streamed_masses,
             velocities_only: self.velocities_only && other.velocities_only,
+            shape_friction: self.shape_friction && other.shape_friction,
         }
     }
 }

@@ -9,9 +9,10 @@ use pgs_interface::control::{
     GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO,
     IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS,
     POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY,
-    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE, SPIN_DAMPING,
-    SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY, WORK_CYCLES,
-    ap_ctrl, channels, depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
+    SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
+    SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY,
+    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
+    memory_per_record, numbers,
 };
 use pgs_interface::extension::Extensions;
 use pgs_interface::number::Numbers;
@@ -46,6 +47,7 @@ pub(crate) struct Shape {
     pub(crate) inverse_mass: f32,
     /// Isotropic; unused with world inertia.
     pub(crate) inverse_inertia: f32,
+    pub(crate) friction: f32,
 }
 
 /// The accelerator's counters of a step.
@@ -213,32 +215,31 @@ impl Registers {
         let time_step = self.number(TIME_STEP.offset);
         let set = self.argument(FLAGS.offset);
         let integrate = flags::INTEGRATE.is_set(set);
-        let Extensions {
-            kinematic,
-            pair_friction,
-            warm_start,
-            streamed_masses,
-            velocities_only,
-            ..
-        } = self.extensions;
+        let has = self.extensions;
+        let streamed_masses = has.streamed_masses && flags::STREAMED_MASSES.is_set(set);
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
             contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
             integrate,
-            velocities_only: velocities_only && !integrate && flags::VELOCITIES_ONLY.is_set(set),
-            kinematic: kinematic && flags::KINEMATIC.is_set(set),
-            streamed_masses: streamed_masses && flags::STREAMED_MASSES.is_set(set),
-            warm_start: warm_start && flags::WARM_START.is_set(set),
-            impulses_out: warm_start && flags::IMPULSES_OUT.is_set(set),
+            velocities_only: has.velocities_only
+                && !integrate
+                && flags::VELOCITIES_ONLY.is_set(set),
+            kinematic: has.kinematic && flags::KINEMATIC.is_set(set),
+            streamed_masses,
+            warm_start: has.warm_start && flags::WARM_START.is_set(set),
+            impulses_out: has.warm_start && flags::IMPULSES_OUT.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),
                 coefficient: self.number(POSITION_COEFFICIENT.offset),
                 friction: self.number(FRICTION.offset),
                 spin_damping: self.number(SPIN_DAMPING.offset),
-                pair_friction: pair_friction && flags::PAIR_FRICTION.is_set(set),
+                pair_friction: has.pair_friction && flags::PAIR_FRICTION.is_set(set),
+                shape_friction: has.shape_friction
+                    && !streamed_masses
+                    && flags::SHAPE_FRICTION.is_set(set),
             },
             integration: Integration {
                 time_step,
@@ -314,6 +315,7 @@ impl Registers {
             return Some(match at {
                 SHAPE_INVERSE_MASS => shape.inverse_mass.to_bits(),
                 SHAPE_INVERSE_INERTIA => shape.inverse_inertia.to_bits(),
+                SHAPE_FRICTION => shape.friction.to_bits(),
                 _ => 0,
             });
         }
@@ -400,9 +402,11 @@ impl Registers {
     /// Writes a register; `None` if no register has this offset.
     pub(super) fn write(&mut self, offset: u32, value: u32) -> Option<Request> {
         if let Some((index, at)) = self.shape_at(offset) {
+            let (shape, number) = (&mut self.shapes[index], f32::from_bits(value));
             match at {
-                SHAPE_INVERSE_MASS => self.shapes[index].inverse_mass = f32::from_bits(value),
-                SHAPE_INVERSE_INERTIA => self.shapes[index].inverse_inertia = f32::from_bits(value),
+                SHAPE_INVERSE_MASS => shape.inverse_mass = number,
+                SHAPE_INVERSE_INERTIA => shape.inverse_inertia = number,
+                SHAPE_FRICTION if self.extensions.shape_friction => shape.friction = number,
                 _ => {}
             }
             return Some(Request::None);

@@ -20,6 +20,8 @@ use pgs_interface::record::CONTACT_POINTS;
 pub(crate) struct Mass {
     pub(crate) inverse_mass: f32,
     pub(crate) inverse_inertia: Stored,
+    /// Friction of the body's shape.
+    pub(crate) friction: f32,
 }
 
 impl Mass {
@@ -29,6 +31,7 @@ impl Mass {
         Self {
             inverse_mass: round(self.inverse_mass),
             inverse_inertia: self.inverse_inertia.map(round),
+            friction: round(self.friction),
         }
     }
 }
@@ -55,6 +58,8 @@ pub(crate) struct SolverParameters {
     pub(crate) spin_damping: f32,
     /// Whether each collision has a friction of its own, in place of `friction`.
     pub(crate) pair_friction: bool,
+    /// Whether the friction of a collision is the product of both shapes', in place of `friction`.
+    pub(crate) shape_friction: bool,
 }
 
 impl SolverParameters {
@@ -68,6 +73,7 @@ impl SolverParameters {
             friction: round(self.friction),
             spin_damping: round(self.spin_damping),
             pair_friction: self.pair_friction,
+            shape_friction: self.shape_friction,
         }
     }
 }
@@ -264,8 +270,15 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     let centre = sum * (Number::new(1.0) / Number::new(collision.count as f32));
     let arm_a = centre - position_a;
     let arm_b = centre - position_b;
-    let mu = if parameters.pair_friction { collision.friction } else { parameters.friction };
-    let limit = Number::<U>::new(mu) * Number::new(impulses[0]);
+    let mu = match parameters {
+        SolverParameters { pair_friction: true, .. } => Number::<U>::new(collision.friction),
+        SolverParameters { shape_friction: true, .. } => {
+            let [a, b] = masses.map(|mass| Number::new(mass.friction));
+            a * b
+        }
+        _ => Number::new(parameters.friction),
+    };
+    let limit = mu * Number::new(impulses[0]);
     for (k, (t, accumulated)) in tangents(q).into_iter().zip(&mut impulses[1..3]).enumerate() {
         let row = Row::new(t, arm_a, arm_b, &inverses);
         if row.jacobian.is_zero() {
@@ -302,8 +315,8 @@ mod tests {
     use crate::accelerator::arithmetic::inertia::Isotropic;
     use crate::accelerator::arithmetic::number::Single;
 
-    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6] };
-    const GROUND: Mass = Mass { inverse_mass: 0.0, inverse_inertia: [0.0; 6] };
+    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6], friction: 0.0 };
+    const GROUND: Mass = Mass { inverse_mass: 0.0, ..UNIT };
     const PARAMETERS: SolverParameters = SolverParameters {
         time_step: 0.5,
         drift: 0.0,
@@ -311,6 +324,7 @@ mod tests {
         friction: 0.5,
         spin_damping: 0.1,
         pair_friction: false,
+        shape_friction: false,
     };
 
     /// A point mass above the ground, normal from B (the mass) down to A (the ground).

@@ -261,7 +261,7 @@ fn packed(
 const SHAPES: [Shape; 3] = [
     Shape::STATIC,
     Shape::isotropic(1.0, 1.5),
-    Shape { inverse_mass: 2.0, inverse_inertia: [1.0, 2.0, 3.0] },
+    Shape { inverse_inertia: [1.0, 2.0, 3.0], ..Shape::isotropic(2.0, 0.0) },
 ];
 
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {

@@ -14,6 +14,6 @@ pub struct Shape {
 impl From<Shape> for zynq_pgs::Shape {
     fn from(shape: Shape) -> Self {
         let Shape { inverse_mass, inverse_inertia } = shape;
-        Self { inverse_mass, inverse_inertia }
+        Self { inverse_inertia, ..Self::isotropic(inverse_mass, 0.0) }
     }
 }

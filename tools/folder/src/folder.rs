@@ -262,7 +262,7 @@ fn distinct(
     for (body, (mass, inertia)) in inverse_masses.iter().zip(inverse_inertias).enumerate() {
         let [x, y, z] = inertia.map(f32::to_bits);
         let index = known.entry([mass.to_bits(), x, y, z]).or_insert_with(|| {
-            shapes.push(Shape { inverse_mass: *mass, inverse_inertia: *inertia });
+            shapes.push(Shape { inverse_inertia: *inertia, ..Shape::isotropic(*mass, 0.0) });
             first_bodies.push(body);
             // A table has far fewer entries; `check_shapes` refuses the excess before the index is
             // used.

@@ -61,9 +61,10 @@ impl Deferred {
 impl Defer for Deferred {
     fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) -> bool {
         self.computed = 0;
-        // Designs whose impulses lie elsewhere go the long way.
+        // Designs whose impulses lie elsewhere go the long way, and so do frictions of shapes.
         let impulses = arguments.warm_start || arguments.impulses_out;
-        self.active = !impulses || self.decoded.layout.warm_share.is_some();
+        self.active = (!impulses || self.decoded.layout.warm_share.is_some())
+            && !arguments.solver.shape_friction;
         if self.active {
             self.decoded.begin_step(arguments, shapes);
         }

@@ -133,7 +133,7 @@ impl Yardstick {
         parameters: &StepParameters,
     ) -> Self {
         let moving = |body: &Body| {
-            let Shape { inverse_mass, inverse_inertia } = shapes[index(body.shape)];
+            let Shape { inverse_mass, inverse_inertia, .. } = shapes[index(body.shape)];
             let Velocity { linear, angular } = body.velocity;
             (body.pose, Moving { linear, inverse_mass, angular, inverse_inertia })
         };

@@ -194,7 +194,7 @@ fn shape_of(body: &RigidBody) -> zynq_pgs::Shape {
     }
     let properties = &body.mass_properties().local_mprops;
     let inverse_inertia = properties.inv_principal_inertia.to_array();
-    zynq_pgs::Shape { inverse_mass: properties.inv_mass, inverse_inertia }
+    zynq_pgs::Shape { inverse_inertia, ..zynq_pgs::Shape::isotropic(properties.inv_mass, 0.0) }
 }
 
 /// A body of shape 0 where a body of Rapier is. Its axes are the axes of its inertia.

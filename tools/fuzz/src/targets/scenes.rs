@@ -235,6 +235,7 @@ pub(super) fn parameters(
         parameters.pair_friction = of.pair_friction && wanted & 2 == 2;
         parameters.warm_start = of.warm_start && wanted & 4 == 4;
         parameters.impulses_out = of.warm_start && wanted & 8 == 8;
+        parameters.shape_friction = of.shape_friction && wanted & 16 == 16;
     }
     if switches & 12 == 12 {
         parameters.order = Some(input.pick(&[

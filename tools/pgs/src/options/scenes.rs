@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
 use step_folder::npy;
-use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
+use zynq_pgs::{Capabilities, StepParameters};
 
 use crate::failure::Failure;
 use crate::numbers::grouped;
@@ -139,13 +139,20 @@ impl SceneArgs {
         Err(Failure::input(error).next("give a smaller --grid"))
     }
 
-    /// Gives the collisions of the shapes a friction for each pair.
-    pub(crate) fn give_frictions(&self, scene: &mut Scene) -> Result<(), Failure> {
+    /// Gives the shapes their frictions, which a step takes from each collision or from the table of shapes.
+    pub(crate) fn give_frictions(
+        &self,
+        scene: &mut Scene,
+        parameters: &StepParameters,
+    ) -> Result<(), Failure> {
         if self.is_cubes() {
             let error = "--pair-friction is for --scene shapes, the cubes have one friction";
             return Err(Failure::input(error));
         }
-        scene.set_frictions(&SHAPE_FRICTIONS);
+        match parameters.shape_friction {
+            true => scene.set_shape_frictions(&SHAPE_FRICTIONS),
+            false => scene.set_frictions(&SHAPE_FRICTIONS),
+        }
         Ok(())
     }
 

@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_body_turns_about_its_own_axes() {
         // Inertia 1, 2 and 4 kg m²; the spin is about the world's y.
-        let shapes = [Shape { inverse_mass: 1.0, inverse_inertia: [1.0, 0.5, 0.25] }];
+        let shapes = [Shape { inverse_inertia: [1.0, 0.5, 0.25], ..Shape::isotropic(1.0, 0.0) }];
         let half = 0.5_f32.sqrt();
         for (orientation, inertia) in [
             (LEVEL, 2.0),

@@ -58,7 +58,7 @@ mod tests {
         let shapes = [
             Shape::STATIC,
             Shape::isotropic(0.25, 0.5),
-            Shape { inverse_mass: 0.25, inverse_inertia: [1.0, 0.5, 0.25] },
+            Shape { inverse_inertia: [1.0, 0.5, 0.25], ..Shape::isotropic(0.25, 0.0) },
         ];
         let of = |shape| momentum(&[Body { pose, velocity, shape }], &shapes);
         assert_eq!(of(0), Momentum::default());

@@ -34,8 +34,11 @@ pub(super) struct Beside {
 impl Cold {
     /// A scene that is stepped with the parameters of the run, but for a warm start and frictions.
     pub(super) fn new(scene: Scene, parameters: &StepParameters) -> Self {
-        let parameters =
-            parameters.with_warm_start(false).with_impulses_out(false).with_pair_friction(false);
+        let parameters = parameters
+            .with_warm_start(false)
+            .with_impulses_out(false)
+            .with_pair_friction(false)
+            .with_shape_friction(false);
         Self { scene, parameters, last: None }
     }
 

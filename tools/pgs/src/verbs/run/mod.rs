@@ -6,6 +6,7 @@ mod summary;
 
 use std::io::{self, Write};
 
+use bitstream_model::interface::extension::Extensions;
 use clap::Args;
 use scene::Scene;
 use serde_json::{Value, json};
@@ -88,8 +89,9 @@ pub(crate) struct RunArgs {
     /// [default: on for --scene shapes, if the board has the extension]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     warm_start: Option<bool>,
-    /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on
-    /// for --scene shapes, if the board has the extension]
+    /// Give each pair of shapes a friction of its own, from both bodies' kinds: with the
+    /// collisions or, where these have no room for it, from the table of shapes [default: on for
+    /// --scene shapes, if the board has either extension]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
@@ -115,13 +117,17 @@ impl RunArgs {
     fn parameters(&self, can: &Capabilities) -> StepParameters {
         let shapes = !self.scene.is_cubes();
         let warm = self.warm_start.unwrap_or(shapes && can.extensions.warm_start);
-        let frictions = self.pair_friction.unwrap_or(shapes && can.extensions.pair_friction);
+        let Extensions { pair_friction, shape_friction, .. } = can.extensions;
+        let frictions = self.pair_friction.unwrap_or(shapes && (pair_friction || shape_friction));
+        // Where neither can be had, the refusal names the boards whose collisions have a friction.
+        let by_shape = shape_friction && !pair_friction;
         let parameters = StepParameters::default()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(warm)
             .with_impulses_out(warm)
-            .with_pair_friction(frictions);
+            .with_pair_friction(frictions && !by_shape)
+            .with_shape_friction(frictions && by_shape);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
@@ -174,8 +180,8 @@ pub(crate) fn run(
     args.scene.check_size(opened.accelerator.capabilities())?;
     let parameters = args.parameters(opened.accelerator.capabilities());
     let mut scene = args.scene.build(&build)?;
-    if parameters.pair_friction {
-        args.scene.give_frictions(&mut scene)?;
+    if parameters.pair_friction || parameters.shape_friction {
+        args.scene.give_frictions(&mut scene, &parameters)?;
     }
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
@@ -356,6 +362,7 @@ fn document(
     config["spin_damping"] = parameters.spin_damping.into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
+    config["shape_friction"] = parameters.shape_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
     let cold = course.cold.as_mut().and_then(Cold::end_json);
