@@ -82,7 +82,7 @@ fn equals_take_random_register_accesses_alike() {
 #[test]
 fn a_wrong_word_is_named_with_its_record_and_its_values() {
     let folder = golden("two_cubes");
-    let scene = cosim::recorded::scene(&folder);
+    let scene = cosim::recorded::scene(&folder, Inertia::Isotropic);
     let mut both = lock_step(Flaws { wrong: Some(1), ..Flaws::default() });
     let error = outcome::run(&mut both, &scene, &packets(&scene, None)).expect_err("a difference");
     let ExternalError::Difference(difference) = error else { panic!("{error}") };

@@ -20,6 +20,10 @@ impl Vec3 {
     }
 }
 
+/// A symmetric matrix: its rows, which are its columns too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Symmetric(pub(super) [Vec3; 3]);
+
 impl Graph {
     fn by_axis(&mut self, combine: impl Fn(&mut Self, usize) -> Operand) -> Vec3 {
         Vec3([0, 1, 2].map(|axis| combine(self, axis)))
@@ -47,6 +51,11 @@ impl Graph {
             let xy = graph.add(x, y);
             graph.add(xy, z)
         })
+    }
+
+    /// `((xx*v.x + xy*v.y) + xz*v.z, (xy*v.x + yy*v.y) + yz*v.z, (xz*v.x + yz*v.y) + zz*v.z)`
+    pub fn times(&mut self, v: Vec3, matrix: Symmetric) -> Vec3 {
+        self.by_axis(|graph, axis| graph.dot(matrix.0[axis], v))
     }
 
     /// `a.y*b.z - a.z*b.y` and so on.
