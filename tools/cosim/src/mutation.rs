@@ -174,6 +174,62 @@ pub const MUTATIONS: &[Mutation] = &[
         right: "begin_packet(next_segment, next_is_warm);",
         wrong: "begin_packet(next_segment, warm_start);",
     },
+    Mutation {
+        name: "two products of inertia change places",
+        inertia: Inertia::World,
+        file: "contact.v",
+        right: "inverse_inertia_a_xz = inverse_inertia_a[159:128];",
+        wrong: "inverse_inertia_a_xz = inverse_inertia_a[191:160];",
+    },
+    Mutation {
+        name: "the friction passes give body B the inertia of body A",
+        inertia: Inertia::World,
+        file: "core.v",
+        right: ".inverse_inertia_b(mass_b[PROPERTIES-1:32]),\n    .per_count",
+        wrong: ".inverse_inertia_b(mass_a[PROPERTIES-1:32]),\n    .per_count",
+    },
+    Mutation {
+        name: "a product of inertia comes a slot early in the friction pipeline",
+        inertia: Inertia::World,
+        file: "friction.v",
+        right: "delay #(.WIDTH(32), .SLOTS(49)) delay_inverse_inertia_a_yz_d49",
+        wrong: "delay #(.WIDTH(32), .SLOTS(48)) delay_inverse_inertia_a_yz_d49",
+    },
+    Mutation {
+        name: "a body that brings no mass has that of its shape",
+        inertia: Inertia::World,
+        file: "world_bodies.v",
+        right: "streamed_masses ? {",
+        wrong: "(streamed_masses & |diagonal[126:96]) ? {",
+    },
+    Mutation {
+        name: "a streamed mass of subnormal size counts as none",
+        inertia: Inertia::World,
+        file: "world_bodies.v",
+        right: "? {|diagonal[126:96], diagonal[127:96]}",
+        wrong: "? {|diagonal[126:119], diagonal[127:96]}",
+    },
+    Mutation {
+        name: "a body that brings its mass needs a shape of the table",
+        inertia: Inertia::World,
+        file: "loader.v",
+        right: "write_s1 & beyond_s1 & names_shape;",
+        wrong: "write_s1 & beyond_s1;",
+    },
+    Mutation {
+        name: "one body with world inertia has the beats of an isotropic one",
+        inertia: Inertia::World,
+        file: "receiver.v",
+        right: "velocity_beats_one  <= velocity_beats_next == 21'd1;",
+        wrong: "velocity_beats_one  <= body_beats_next == 21'd1;",
+    },
+    Mutation {
+        name: "the load with world inertia does not wait for the last row",
+        inertia: Inertia::World,
+        file: "bodies.v",
+        right: ".there(&there), .linear",
+        wrong: ".there(&there[2:0]), .linear",
+    },
 ];
 
 impl Mutation {
