@@ -51,16 +51,13 @@ module receiver #(
 
   // Beats of a packet on this stream.
   localparam [20:0] BODY_OFFSET = 21'd3 - CHANNEL;
-  reg [20:0] velocity_beats, body_beats, pass_beats;
-  reg        velocity_beats_none, velocity_beats_one, body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
+  reg [20:0] body_beats, pass_beats;
+  reg        one_body, body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
   reg [9:0]  before_friction;    // passes left when the last contact pass is under way
   wire [20:0] body_beats_next = ({bodies, 1'b0} + BODY_OFFSET) >> 2;
-  wire [20:0] velocity_beats_next = (WORLD_INERTIA != 0) ? {1'b0, bodies} : body_beats_next;
   wire [20:0] pass_beats_next = (CHANNEL == 3) ? {1'b0, collisions} : {collisions, 1'b0};
   always @(posedge clk) begin
-    velocity_beats      <= velocity_beats_next;
-    velocity_beats_none <= velocity_beats_next == 21'd0;
-    velocity_beats_one  <= velocity_beats_next == 21'd1;
+    one_body        <= bodies == 20'd1;
     body_beats      <= body_beats_next;
     pass_beats      <= pass_beats_next;
     body_beats_none <= body_beats_next == 21'd0;
@@ -92,7 +89,7 @@ module receiver #(
   wire [1:0] next_segment  = (segment == VELOCITIES) ? after_load
                            : (in_pass & ~pass_is_last) ? PASSES
                            : in_pass ? after_passes : FINISHED;
-  wire [1:0] first_segment = velocity_beats_none ? after_load : VELOCITIES;
+  wire [1:0] first_segment = ((WORLD_INERTIA == 0) & body_beats_none) ? after_load : VELOCITIES;
   wire       next_is_warm  = warm_start & (~in_pass | (passes_left == before_friction));
 
   task begin_packet(input [1:0] of, input warm);
@@ -101,9 +98,11 @@ module receiver #(
       open         <= of != FINISHED;
       beat         <= 21'd0;
       second       <= 1'b0;
-      left         <= (of == VELOCITIES) ? velocity_beats : (of != PASSES) ? body_beats
+      left         <= ((WORLD_INERTIA != 0) & (of == VELOCITIES)) ? {1'b0, bodies}
+                    : (of != PASSES) ? body_beats
                     : ((CHANNEL == 3) & warm) ? {collisions, 1'b0} : pass_beats;
-      beat_is_last <= (of == VELOCITIES) ? velocity_beats_one : (of != PASSES) ? body_beats_one
+      beat_is_last <= ((WORLD_INERTIA != 0) & (of == VELOCITIES)) ? one_body
+                    : (of != PASSES) ? body_beats_one
                     : pass_beats_one & ~((CHANNEL == 3) & warm);
     end
   endtask

@@ -220,8 +220,8 @@ pub const MUTATIONS: &[Mutation] = &[
         name: "one body with world inertia has the beats of an isotropic one",
         inertia: Inertia::World,
         file: "receiver.v",
-        right: "velocity_beats_one  <= velocity_beats_next == 21'd1;",
-        wrong: "velocity_beats_one  <= body_beats_next == 21'd1;",
+        right: "& (of == VELOCITIES)) ? one_body\n",
+        wrong: "& (of == VELOCITIES)) ? body_beats_one\n",
     },
     Mutation {
         name: "the load with world inertia does not wait for the last row",

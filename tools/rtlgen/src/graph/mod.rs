@@ -298,9 +298,7 @@ impl Graph {
 
     /// An input of a symmetric matrix: xx, yy, zz, xy, xz, yz.
     pub fn input_symmetric(&mut self, source: Source, name: &str) -> Symmetric {
-        let [xx, yy, zz, xy, xz, yz] =
-            self.input_port(source, name, ["_xx", "_yy", "_zz", "_xy", "_xz", "_yz"]);
-        Symmetric([Vec3([xx, xy, xz]), Vec3([xy, yy, yz]), Vec3([xz, yz, zz])])
+        Symmetric(self.input_port(source, name, ["_xx", "_yy", "_zz", "_xy", "_xz", "_yz"]))
     }
 
     fn input_port<const N: usize>(

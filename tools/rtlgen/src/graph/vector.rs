@@ -20,9 +20,9 @@ impl Vec3 {
     }
 }
 
-/// A symmetric matrix: its rows, which are its columns too.
+/// A symmetric matrix: xx, yy, zz, xy, xz, yz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Symmetric(pub(super) [Vec3; 3]);
+pub struct Symmetric(pub [Operand; 6]);
 
 impl Graph {
     fn by_axis(&mut self, combine: impl Fn(&mut Self, usize) -> Operand) -> Vec3 {
@@ -54,8 +54,9 @@ impl Graph {
     }
 
     /// `((xx*v.x + xy*v.y) + xz*v.z, (xy*v.x + yy*v.y) + yz*v.z, (xz*v.x + yz*v.y) + zz*v.z)`
-    pub fn times(&mut self, v: Vec3, matrix: Symmetric) -> Vec3 {
-        self.by_axis(|graph, axis| graph.dot(matrix.0[axis], v))
+    pub fn times(&mut self, v: Vec3, Symmetric([xx, yy, zz, xy, xz, yz]): Symmetric) -> Vec3 {
+        let rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        self.by_axis(|graph, axis| graph.dot(Vec3(rows[axis]), v))
     }
 
     /// `a.y*b.z - a.z*b.y` and so on.
