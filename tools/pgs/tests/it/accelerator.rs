@@ -63,7 +63,10 @@ fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
     let (code, stderr) = solve(&isotropic, &["--inertia", "world"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("built for isotropic inertia, and the board for world"), "{stderr}");
-    assert!(stderr.contains("add --inertia isotropic, or build the simulator with"), "{stderr}");
+    assert!(
+        stderr.contains("add --inertia isotropic, or build the simulator with --inertia world"),
+        "{stderr}"
+    );
 }
 
 fn serve(folder: &Path, accelerator: &str, more: &[&str]) -> Command {
