@@ -42,6 +42,7 @@ Examples:
   cosim recorded --simulator target/rtl/pgs-rtl tests/golden/*/
   cosim random --simulator target/rtl/pgs-rtl --cases 1000
   cosim random --simulator target/rtl/pgs-rtl --gaps 300 --stalls 700
+  cosim random --simulator target/rtl-world/pgs-rtl --inertia world
   cosim errors --simulator target/rtl/pgs-rtl
   cosim full --simulator target/rtl/pgs-rtl
   cosim registers --simulator target/rtl/pgs-rtl --cases 500
