@@ -15,7 +15,7 @@ use super::port::Port;
 use super::symptom::Symptom;
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::beat::pack::pool::PackPool;
-use crate::control_block::{Capabilities, Control, Fingerprint, identify};
+use crate::control_block::{Capabilities, Control, Fingerprint, StepArguments, identify};
 use crate::error::OpenError;
 use crate::fault::Fault;
 use crate::platform::{
@@ -266,12 +266,14 @@ impl Device {
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let extensions = self.capabilities.extensions;
-        self.control.set_arguments(
-            count(plan.bodies),
-            count(plan.collisions),
-            (parameters, plan.streamed_masses),
-            extensions,
-        );
+        let arguments = StepArguments {
+            bodies: count(plan.bodies),
+            collisions: count(plan.collisions),
+            parameters,
+            streamed_masses: plan.streamed_masses,
+            velocities_only: plan.velocities_only,
+        };
+        self.control.set_arguments(&arguments, extensions);
         // Buffers and descriptors must be visible before the first doorbell.
         release_to_device();
         Ok(())

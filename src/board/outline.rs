@@ -62,7 +62,15 @@ mod tests {
     fn outline(variant: pgs_interface::profile::Variant, collisions: usize) -> Outline {
         let passes = Passes { contact: 3, friction: 2, ..Passes::default() };
         // One beat a descriptor.
-        Outline::new(&Plan { bodies: 8, collisions, passes, variant, streamed_masses: false }, 16)
+        let plan = Plan {
+            bodies: 8,
+            collisions,
+            passes,
+            variant,
+            streamed_masses: false,
+            velocities_only: false,
+        };
+        Outline::new(&plan, 16)
     }
 
     #[test]

@@ -19,7 +19,7 @@ use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 use crate::axi_dma::pieces;
-use crate::beat::stripe::Segment;
+use crate::beat::stripe::{Layout, Segment};
 use crate::control_block::Capabilities;
 use crate::control_block::time_of;
 use crate::scene::{Passes, StepParameters};
@@ -41,6 +41,8 @@ pub(crate) struct Plan {
     pub(crate) variant: Variant,
     /// Whether the velocity records bring the inverse masses, because the shapes do not fit the table.
     pub(crate) streamed_masses: bool,
+    /// Whether no poses go to the board, and velocities come back alone.
+    pub(crate) velocities_only: bool,
 }
 
 /// Where the segments lie in the buffer of one MM2S channel, beats.
@@ -100,7 +102,8 @@ impl Plan {
             start..start + segment.layout(&self.variant).beats_on_channel(records, channel)
         };
         let velocities = place(Segment::Velocities, self.bodies, 0);
-        let poses = place(Segment::Poses, self.bodies, velocities.end);
+        let poses = if self.velocities_only { 0 } else { self.bodies };
+        let poses = place(Segment::Poses, poses, velocities.end);
         let collisions = place(Segment::Collisions, self.collisions, poses.end);
         let mut end = collisions.end;
         let mut warm = |passes: u32| {
@@ -125,10 +128,16 @@ impl Plan {
         if channel == IMPULSES_STREAM { self.collisions * self.passes.kinds_out() } else { 0 }
     }
 
+    /// The layout of the results.
+    pub(crate) const fn result_layout(&self) -> Layout {
+        let segment =
+            if self.velocities_only { Segment::VelocityResults } else { Segment::Results };
+        segment.layout(&self.variant)
+    }
+
     /// Beats of results on one S2MM channel, with the impulses in front of them.
     pub(crate) fn results(&self, channel: usize) -> usize {
-        self.impulses(channel)
-            + Segment::Results.layout(&self.variant).beats_on_channel(self.bodies, channel)
+        self.impulses(channel) + self.result_layout().beats_on_channel(self.bodies, channel)
     }
 
     /// Descriptors of one MM2S channel, whose descriptors carry at most `largest` bytes.
@@ -208,6 +217,7 @@ mod tests {
         passes: PASSES,
         variant: FLOAT.default_variant(),
         streamed_masses: false,
+        velocities_only: false,
     };
     const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
@@ -256,6 +266,18 @@ mod tests {
         let contact_alone = Passes { friction: 0, ..passes };
         let plan = Plan { passes: contact_alone, ..FOUR };
         assert_eq!((plan.impulses(0), plan.segments(3).warm_friction), (collisions, None));
+    }
+
+    /// Half the beats out, and the poses in, of `float`; the padding of `half`.
+    #[test]
+    fn a_step_without_poses_brings_velocities_back() {
+        let plan = Plan { velocities_only: true, ..FOUR };
+        assert_eq!(plan.bytes_to_device(), 16 * (2 * 38_881 + 8 * 7 * 127_746));
+        assert_eq!(plan.bytes_from_device(), 16 * 2 * 38_881);
+        assert!((0..4).all(|channel| plan.segments(channel).poses.is_empty()));
+        assert!((0..4).all(|channel| plan.descriptors(channel, 67_108_800) == 9));
+        let half = Plan { variant: HALF.default_variant(), ..plan };
+        assert_eq!(half.bytes_from_device(), 16 * 38_885);
     }
 
     #[test]

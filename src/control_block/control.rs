@@ -20,18 +20,30 @@ const RESET_LIMIT: Duration = Duration::from_millis(10);
 /// Number of arguments, extensions included.
 const ARGUMENTS: usize = 14;
 
-/// The arguments of a step: register and value.
-fn arguments(
-    bodies: u32,
-    collisions: u32,
-    (parameters, streamed_masses): (&StepParameters, bool),
-) -> [(Register, u32); ARGUMENTS] {
+/// The arguments of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepArguments<'a> {
+    /// Records of bodies.
+    pub(crate) bodies: u32,
+    /// Records of collisions.
+    pub(crate) collisions: u32,
+    /// The caller's parameters.
+    pub(crate) parameters: &'a StepParameters,
+    /// Whether the bodies bring their masses; else the shape table has them.
+    pub(crate) streamed_masses: bool,
+    /// Whether velocities come back alone; else poses go to the board, and come back with them.
+    pub(crate) velocities_only: bool,
+}
+
+/// The argument registers of a step and their values.
+fn registers_of(arguments: &StepArguments<'_>) -> [(Register, u32); ARGUMENTS] {
+    let StepArguments { bodies, collisions, parameters, .. } = *arguments;
     [
         (BODIES, bodies),
         (COLLISIONS, collisions),
         (CONTACT_ITERATIONS, parameters.contact_iterations),
         (FRICTION_ITERATIONS, parameters.friction_iterations),
-        (FLAGS, flags_of(parameters, streamed_masses)),
+        (FLAGS, flags_of(arguments)),
         (TIME_STEP, parameters.time_step.to_bits()),
         (POSITION_DRIFT, parameters.position_drift.to_bits()),
         (POSITION_COEFFICIENT, parameters.position_coefficient.to_bits()),
@@ -45,13 +57,15 @@ fn arguments(
 }
 
 /// The switches of a step.
-fn flags_of(parameters: &StepParameters, streamed_masses: bool) -> u32 {
+fn flags_of(arguments: &StepArguments<'_>) -> u32 {
+    let StepArguments { parameters, streamed_masses, velocities_only, .. } = *arguments;
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
     let word = flags::WARM_START.put(word, parameters.warm_start.into());
     let word = flags::IMPULSES_OUT.put(word, parameters.impulses_out.into());
-    flags::STREAMED_MASSES.put(word, streamed_masses.into())
+    let word = flags::STREAMED_MASSES.put(word, streamed_masses.into());
+    flags::VELOCITIES_ONLY.put(word, velocities_only.into())
 }
 
 /// The accelerator's control block.
@@ -79,18 +93,9 @@ impl Control {
     }
 
     /// Writes the arguments that differ from the values in the registers. A board without an
-    /// extension has no register for its argument. With the second of `parameters` the bodies bring their
-    /// masses; else the shape table has them.
-    pub(crate) fn set_arguments(
-        &mut self,
-        bodies: u32,
-        collisions: u32,
-        parameters: (&StepParameters, bool),
-        extensions: Extensions,
-    ) {
-        for (place, (register, value)) in
-            arguments(bodies, collisions, parameters).into_iter().enumerate()
-        {
+    /// extension has no register for its argument.
+    pub(crate) fn set_arguments(&mut self, arguments: &StepArguments<'_>, extensions: Extensions) {
+        for (place, (register, value)) in registers_of(arguments).into_iter().enumerate() {
             let exists = register.offset != SPIN_DAMPING.offset || extensions.spin_damping;
             if exists && self.written[place] != Some(value) {
                 self.write(register.offset, value);
@@ -136,35 +141,50 @@ mod tests {
     use crate::platform::RegisterMap;
     use crate::platform::fake::{FakePlatform, FakeRegisters};
 
+    /// Two bodies and a collision.
+    fn step(parameters: &StepParameters) -> StepArguments<'_> {
+        StepArguments {
+            bodies: 2,
+            collisions: 1,
+            parameters,
+            streamed_masses: false,
+            velocities_only: false,
+        }
+    }
+
     #[test]
     fn only_arguments_that_changed_are_written() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let parameters = StepParameters::default();
-        control.set_arguments(2, 1, (&parameters, false), Extensions::ALL);
+        control.set_arguments(&step(&parameters), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), ARGUMENTS);
         assert_eq!(registers.with(|state| state.values[&0x38]), (1.0f32 / 60.0).to_bits());
         assert_eq!(registers.with(|state| state.values[&0x30]), 1);
-        control.set_arguments(2, 7, (&parameters, false), Extensions::ALL);
+        let more = StepArguments { collisions: 7, ..step(&parameters) };
+        control.set_arguments(&more, Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes[ARGUMENTS..].to_vec()), [(0x18, 7)]);
     }
 
     #[test]
     fn each_switch_has_its_bit() {
-        let word = |parameters: StepParameters| flags_of(&parameters, false);
+        let word = |parameters: StepParameters| flags_of(&step(&parameters));
         let none = StepParameters::default().with_integrate(false);
         assert_eq!(word(none), 0b000);
         assert_eq!(word(StepParameters::default()), 0b001);
         assert_eq!(word(none.with_kinematic(true)), 0b010);
         assert_eq!(word(none.with_pair_friction(true)), 0b100);
-        assert_eq!(flags_of(&none, true), 0b10_0000);
+        let masses = StepArguments { streamed_masses: true, ..step(&none) };
+        assert_eq!(flags_of(&masses), 0b010_0000);
+        let velocities = StepArguments { velocities_only: true, ..step(&none) };
+        assert_eq!(flags_of(&velocities), 0b100_0000);
     }
 
     #[test]
     fn a_board_of_version_1_1_gets_no_argument_that_it_lacks() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::NONE);
+        control.set_arguments(&step(&StepParameters::default()), Extensions::NONE);
         assert_eq!(registers.with(|state| state.writes.len()), 13);
         assert!(registers.with(|state| state.writes.iter().all(|(offset, _)| *offset <= 0x70)));
     }
@@ -174,13 +194,13 @@ mod tests {
         let registers = FakeRegisters::default();
         registers.with(|state| state.kept_bits.insert(0x1C0, 0));
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::ALL);
+        control.set_arguments(&step(&StepParameters::default()), Extensions::ALL);
         control.reset(&FakePlatform::default()).expect("out of reset");
         assert_eq!(
             registers.with(|state| state.writes[ARGUMENTS..].to_vec()),
             [(0x1C0, 1), (0x04, 1), (0x08, 4)]
         );
-        control.set_arguments(2, 1, (&StepParameters::default(), false), Extensions::ALL);
+        control.set_arguments(&step(&StepParameters::default()), Extensions::ALL);
         assert_eq!(registers.with(|state| state.writes.len()), 2 * ARGUMENTS + 3);
     }
 

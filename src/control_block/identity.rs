@@ -76,6 +76,11 @@ impl Capabilities {
         self.extensions.streamed_masses && shapes > self.shape_capacity as usize
     }
 
+    /// Whether a step that integrates nothing does without poses.
+    pub(crate) const fn without_poses(&self, integrate: bool) -> bool {
+        self.extensions.velocities_only && !integrate
+    }
+
     /// The largest number of shapes. Where each body can bring its inverse mass, the table does not limit it.
     #[must_use]
     pub const fn shapes_max(&self) -> u32 {

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::platform::PlatformError;
 
-pub(crate) use control::Control;
+pub(crate) use control::{Control, StepArguments};
 pub use counters::Saturated;
 pub(crate) use counters::{Counters, StickyError, impulse, time_of};
 pub(crate) use fingerprint::{Changed, Fingerprint};

@@ -105,6 +105,36 @@ impl Shape {
         })
     }
 
+    /// A solid cylinder of uniform density, its axis along the body's y: I.y = m r² / 2, and
+    /// I.x = I.z = m (r² / 4 + h² / 3).
+    ///
+    /// Units: kg; half its length and its radius, m.
+    ///
+    /// # Errors
+    /// As for [`cuboid`](Self::cuboid).
+    pub fn cylinder(mass: f32, half_height: f32, radius: f32) -> Result<Self, ShapeError> {
+        Self::solid(mass, &[("half height", half_height), ("radius", radius)], |[h, r]| {
+            let across = r * r / 4.0 + h * h / 3.0;
+            [across, r * r / 2.0, across]
+        })
+    }
+
+    /// A body of any form, by its moments of inertia about the body's axes, which must be its
+    /// principal axes.
+    ///
+    /// Units: kg, kg m².
+    ///
+    /// # Errors
+    /// As for [`cuboid`](Self::cuboid).
+    pub fn with_inertia(mass: f32, inertia: [f32; 3]) -> Result<Self, ShapeError> {
+        let [x, y, z] = inertia;
+        Self::solid(
+            mass,
+            &[("inertia about x", x), ("inertia about y", y), ("inertia about z", z)],
+            |inertia| inertia.map(|value| value / f64::from(mass)),
+        )
+    }
+
     /// A shape whose inertia per kg follows from its size.
     fn solid<const N: usize>(
         mass: f32,
@@ -203,6 +233,26 @@ mod tests {
     }
 
     #[test]
+    fn a_cylinder_lies_between_a_disc_and_a_rod() {
+        // 12 kg, 2 m long, radius 1 m: I.y = 12 / 2, I.x = 12 (1/4 + 1/3).
+        let [x, y, z] = Shape::cylinder(12.0, 1.0, 1.0).expect("a cylinder").inverse_inertia;
+        close(x, 1.0 / 7.0);
+        close(y, 1.0 / 6.0);
+        assert_eq!(x.to_bits(), z.to_bits());
+        close(Shape::cylinder(3.0, 1000.0, 1e-4).expect("a rod").inverse_inertia[0], 1e-6);
+        close(Shape::cylinder(1.0, 1e-9, 2.0).expect("a disc").inverse_inertia[0], 1.0);
+    }
+
+    #[test]
+    fn moments_of_inertia_are_inverted() {
+        let shape = Shape::with_inertia(3.0, [0.5, 2.0, 8.0]).expect("a shape");
+        close(shape.inverse_mass, 1.0 / 3.0);
+        for (found, expected) in shape.inverse_inertia.into_iter().zip([2.0, 0.5, 0.125]) {
+            close(found, expected);
+        }
+    }
+
+    #[test]
     fn parameters_that_are_not_above_zero_are_refused_by_name() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             let refused = |shape: Result<Shape, ShapeError>, name: &str| {
@@ -220,6 +270,10 @@ mod tests {
             refused(Shape::sphere(1.0, bad), "radius");
             refused(Shape::capsule(1.0, bad, 1.0), "half height");
             refused(Shape::capsule(1.0, 1.0, bad), "radius");
+            refused(Shape::cylinder(1.0, bad, 1.0), "half height");
+            refused(Shape::cylinder(1.0, 1.0, bad), "radius");
+            refused(Shape::with_inertia(bad, [1.0; 3]), "mass");
+            refused(Shape::with_inertia(1.0, [1.0, bad, 1.0]), "inertia about y");
         }
     }
 

@@ -142,8 +142,9 @@ fn plan(bodies: usize, variant: Variant) -> Plan {
         Flow::Window(_) => (bodies.next_multiple_of(profile.collisions_per_issue as usize), 1),
     };
     let passes = Passes { contact: passes, ..Passes::default() };
-    // The shapes of an echo fit every table.
-    Plan { bodies, collisions, passes, variant, streamed_masses: false }
+    // The shapes of an echo fit every table, and it needs the poses.
+    let (streamed_masses, velocities_only) = (false, false);
+    Plan { bodies, collisions, passes, variant, streamed_masses, velocities_only }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

@@ -60,7 +60,8 @@ impl Device {
         let SegmentBuffers { mut velocities, mut poses, mut entries, warm } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
-        let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
+        let velocities = &mut velocities[active];
+        let poses = (!plan.velocities_only).then_some(&mut poses[active]);
         let target =
             Target { variant: &plan.variant, shapes, streamed_masses: plan.streamed_masses, quick };
         let packers = &mut self.packers;
@@ -73,7 +74,8 @@ impl Device {
                 let [first, last] = [first, last].map(|order| Chosen { bodies, order });
                 let (velocities, first_passed) =
                     pack_velocities(target, &first, plan.bodies, velocities, packers);
-                let (poses, last_passed) = pack_poses(target, &last, plan.bodies, poses, packers);
+                let (poses, last_passed) =
+                    pack_poses(target, &last, plan.bodies, poses.unwrap_or_default(), packers);
                 (velocities, poses, passed & first_passed & last_passed)
             }
         };
@@ -117,7 +119,8 @@ impl Device {
         let SegmentBuffers { mut velocities, mut poses, mut entries, .. } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
-        let (velocities, poses) = (&mut velocities[active], &mut poses[active]);
+        let velocities = &mut velocities[active];
+        let poses = (!plan.velocities_only).then_some(&mut poses[active]);
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);

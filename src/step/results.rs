@@ -9,7 +9,7 @@ use pgs_interface::stripe::IMPULSES_STREAM;
 use super::packing::SentSums;
 use crate::axi_dma::Direction;
 use crate::beat::pack::pool::PackPool;
-use crate::beat::stripe::{Layout, Segment};
+use crate::beat::stripe::Layout;
 use crate::beat::unpack::results::{BLOCK, Reader, read_all};
 use crate::board::bank::Bank;
 use crate::board::device::Device;
@@ -58,7 +58,7 @@ pub(super) fn read<B: Bodies + ?Sized>(
     let mut records = std::mem::take(staged);
     let Device { s2mm, statics, packers, .. } = device;
     let channels = received(s2mm, plan, bank);
-    let layout = Segment::Results.layout(&plan.variant);
+    let layout = plan.result_layout();
     let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
     let (found, broken) = match lives {
         Some(lives) => results.read_scattered(lives.results(), bodies, &mut records),
@@ -203,6 +203,7 @@ pub(super) fn commit_velocities<B: Bodies + ?Sized>(results: &[Record], bodies: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beat::stripe::Segment;
     use crate::scene::{Body, Pose, Velocity};
     use pgs_interface::profile::FLOAT;
     use pgs_interface::record::result::{ORIENTATION, POSITION};

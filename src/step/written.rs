@@ -114,8 +114,14 @@ impl Accelerator {
         let variant = limits.variant;
         let passes = parameters.passes();
         let streamed_masses = device.capabilities.streams_masses(shapes.len());
-        let mut plan =
-            Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
+        let mut plan = Plan {
+            bodies: bodies.len(),
+            collisions: announced,
+            passes,
+            variant,
+            streamed_masses,
+            velocities_only: device.capabilities.without_poses(parameters.integrate),
+        };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 

@@ -185,6 +185,8 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::flags::PAIR_FRICTION.mask(), 1 << 2);
     assert_eq!(control::flags::WARM_START.mask(), 1 << 3);
     assert_eq!(control::flags::IMPULSES_OUT.mask(), 1 << 4);
+    assert_eq!(control::flags::STREAMED_MASSES.mask(), 1 << 5);
+    assert_eq!(control::flags::VELOCITIES_ONLY.mask(), 1 << 6);
     assert_eq!(control::features::CHECKSUMS.mask(), 1 << 0);
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
@@ -195,6 +197,7 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
     assert_eq!(control::features::WARM_START.mask(), 1 << 8);
     assert_eq!(control::features::STREAMED_MASSES.mask(), 1 << 9);
+    assert_eq!(control::features::VELOCITIES_ONLY.mask(), 1 << 10);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,

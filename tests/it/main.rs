@@ -30,3 +30,4 @@ mod storage;
 mod warm_start;
 mod widths;
 mod windowed;
+mod without_poses;

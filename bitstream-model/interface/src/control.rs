@@ -64,6 +64,9 @@ pub mod flags {
     /// Each velocity record brings the inverse mass of its body, and the shape table is not used. Only in a
     /// bitstream with [`features::STREAMED_MASSES`](super::features::STREAMED_MASSES).
     pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 5, Access::ReadWrite);
+    /// Without [`INTEGRATE`], no poses come in, and the results are velocities alone; with it, this bit has no
+    /// effect. Only in a bitstream with [`features::VELOCITIES_ONLY`](super::features::VELOCITIES_ONLY).
+    pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 6, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -103,6 +106,9 @@ pub mod features {
     /// Velocity records with world inertia can bring the inverse mass of their body
     /// ([`flags::STREAMED_MASSES`](super::flags::STREAMED_MASSES)).
     pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 9, Access::ReadOnly);
+    /// A step that integrates nothing can do without poses
+    /// ([`flags::VELOCITIES_ONLY`](super::flags::VELOCITIES_ONLY)).
+    pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 10, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -277,6 +283,7 @@ pub const FLAGS: Register = row(
         flags::WARM_START,
         flags::IMPULSES_OUT,
         flags::STREAMED_MASSES,
+        flags::VELOCITIES_ONLY,
     ],
     OURS,
 );
@@ -343,6 +350,7 @@ pub const FEATURES: Register = read_only(
         features::PAIR_FRICTION,
         features::WARM_START,
         features::STREAMED_MASSES,
+        features::VELOCITIES_ONLY,
     ],
 );
 /// Numbers of streams.

@@ -20,6 +20,8 @@ pub struct Extensions {
     pub warm_start: bool,
     /// Velocity records with world inertia can bring the inverse mass of their body.
     pub streamed_masses: bool,
+    /// A step that integrates nothing can do without poses: none come in, and velocities alone go out.
+    pub velocities_only: bool,
 }
 
 impl Extensions {
@@ -30,6 +32,7 @@ impl Extensions {
         pair_friction: false,
         warm_start: false,
         streamed_masses: false,
+        velocities_only: false,
     };
     /// All of this version.
     pub const ALL: Self = Self {
@@ -38,6 +41,7 @@ impl Extensions {
         pair_friction: true,
         warm_start: true,
         streamed_masses: true,
+        velocities_only: true,
     };
 
     /// The extensions that the FEATURES register reports.
@@ -49,6 +53,7 @@ impl Extensions {
             pair_friction: features::PAIR_FRICTION.is_set(features),
             warm_start: features::WARM_START.is_set(features),
             streamed_masses: features::STREAMED_MASSES.is_set(features),
+            velocities_only: features::VELOCITIES_ONLY.is_set(features),
         }
     }
 
@@ -61,13 +66,15 @@ impl Extensions {
             | bit(features::PAIR_FRICTION, self.pair_friction)
             | bit(features::WARM_START, self.warm_start)
             | bit(features::STREAMED_MASSES, self.streamed_masses)
+            | bit(features::VELOCITIES_ONLY, self.velocities_only)
     }
 
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
     /// Impulses need passes one after the other, and a stripe for their records. A streamed mass needs the
-    /// rows of a world inertia beside it, and an array of numbers for all bodies.
+    /// rows of a world inertia beside it, and an array of numbers for all bodies. Velocities go out alone
+    /// where they are on chip together.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, inertia } = variant;
@@ -83,6 +90,7 @@ impl Extensions {
             streamed_masses: matches!(inertia, Inertia::World)
                 && matches!(profile.flow, Flow::Passes)
                 && matches!(numbers.bodies, StreamFormat::F32),
+            velocities_only: matches!(profile.flow, Flow::Passes),
         }
     }
 
@@ -95,6 +103,7 @@ impl Extensions {
             pair_friction: self.pair_friction && other.pair_friction,
             warm_start: self.warm_start && other.warm_start,
             streamed_masses: self.streamed_masses && other.streamed_masses,
+            velocities_only: self.velocities_only && other.velocities_only,
         }
     }
 }

@@ -70,6 +70,8 @@ pub(crate) struct Arguments {
     pub(crate) integrate: bool,
     /// Whether bodies of inverse mass 0 have the velocity of their record.
     pub(crate) kinematic: bool,
+    /// Whether no poses come in, and velocities go out alone.
+    pub(crate) velocities_only: bool,
     /// Whether each body brings its inverse mass, in place of its shape's.
     pub(crate) streamed_masses: bool,
     /// Whether impulses come in with the collisions, in a pass in front of the others of each kind.
@@ -210,14 +212,22 @@ impl Registers {
     pub(super) fn arguments(&self) -> Arguments {
         let time_step = self.number(TIME_STEP.offset);
         let set = self.argument(FLAGS.offset);
-        let Extensions { kinematic, pair_friction, warm_start, streamed_masses, .. } =
-            self.extensions;
+        let integrate = flags::INTEGRATE.is_set(set);
+        let Extensions {
+            kinematic,
+            pair_friction,
+            warm_start,
+            streamed_masses,
+            velocities_only,
+            ..
+        } = self.extensions;
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
             contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
-            integrate: flags::INTEGRATE.is_set(set),
+            integrate,
+            velocities_only: velocities_only && !integrate && flags::VELOCITIES_ONLY.is_set(set),
             kinematic: kinematic && flags::KINEMATIC.is_set(set),
             streamed_masses: streamed_masses && flags::STREAMED_MASSES.is_set(set),
             warm_start: warm_start && flags::WARM_START.is_set(set),

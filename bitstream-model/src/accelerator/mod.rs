@@ -62,6 +62,8 @@ pub(crate) enum Phase {
         poses: Segment,
         results: Results,
     },
+    /// In a step without poses the velocities go out.
+    SendVelocities(Results),
     /// All of it at once, in a design that streams the collisions once.
     Window,
     /// The last results are on their way out.
@@ -280,6 +282,7 @@ impl Accelerator {
                     let deferral = deferral.as_deref_mut();
                     self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
+                Phase::SendVelocities(results) => Ok(self.send_velocities(results, outputs)),
                 // The window has taken every beat that has arrived.
                 Phase::Window if ran.cycles > 0 => break,
                 Phase::Window => self.windowed(left, inputs, outputs),
@@ -337,6 +340,7 @@ impl Accelerator {
                 self.hung |= faults.keeps_done();
                 return self.hung;
             }
+            Phase::SendVelocities(_) => (Some(StepPhase::Results), None),
             Phase::Window => (None, None),
             Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
             Phase::Pass { number, segment } => {
@@ -351,7 +355,7 @@ impl Accelerator {
         };
         let (done, arrived) = match segment {
             Some(segment) => (segment.done, segment.done + segment.available(inputs)),
-            // All phases at once: it is at every record.
+            // All phases at once, or the last records: it is at every record.
             None => (0, usize::MAX),
         };
         if arrived == done {

@@ -8,7 +8,7 @@ use pgs_interface::control::{self, ap_ctrl, irq};
 use pgs_interface::descriptor::status;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-use super::packing::{beats_out, result_beats, unpack};
+use super::packing::{beats_of_results, beats_out, rows_out, unpack};
 use super::ring::{EOF, Ring, SOF};
 use super::scene::{Body, Lane, Step};
 use super::windowed::design;
@@ -55,11 +55,18 @@ pub(crate) struct Outcome {
 pub(crate) struct Flight {
     inputs: Vec<u64>,
     outputs: Vec<u64>,
-    /// The last result descriptor of each channel.
-    last: Vec<usize>,
+    /// The last result descriptor of each channel that has results.
+    last: Vec<Option<usize>>,
+    /// Whether the results are velocities alone.
+    velocities_only: bool,
 }
 
 impl Flight {
+    /// The flight of a step, without buffers.
+    pub(crate) fn of(step: &Step) -> Self {
+        Self { velocities_only: step.velocities_only, ..Self::default() }
+    }
+
     /// Adds a buffer with input.
     pub(crate) fn input(&mut self, address: u64) {
         self.inputs.push(address);
@@ -128,13 +135,15 @@ impl Machine {
         for (ring, beats) in self.s2mm.iter_mut().zip(beats) {
             let address = self.host.writable(*beats);
             flight.outputs.push(address);
-            let mut slot = 0;
+            let mut last = None;
             for (offset, bytes) in pieces(beats * BEAT_BYTES, piece) {
                 let control = u32::try_from(bytes).expect("at most 26 bits");
-                slot = ring.push(address + offset as u64, control);
+                last = Some(ring.push(address + offset as u64, control));
             }
-            ring.doorbell(&self.host, slot);
-            flight.last.push(slot);
+            if let Some(slot) = last {
+                ring.doorbell(&self.host, slot);
+            }
+            flight.last.push(last);
         }
     }
 
@@ -202,7 +211,9 @@ impl Machine {
             if code != 0 {
                 return Err(Failure::Accelerator(code, channel, detail));
             }
-            let done = |(ring, slot): (&Ring, &usize)| status::CMPLTED.is_set(ring.status(*slot));
+            let done = |(ring, slot): (&Ring, &Option<usize>)| {
+                slot.is_none_or(|slot| status::CMPLTED.is_set(ring.status(slot)))
+            };
             if self.s2mm.iter().zip(&flight.last).all(done) {
                 return Ok(());
             }
@@ -224,7 +235,8 @@ impl Machine {
         let sum_of_results =
             streams.iter().fold(0, |sum, beats| super::scene::sum_words(sum, beats));
         // They are in front of the results.
-        let results = result_beats(&host.variant(), bodies)[0];
+        let rows = rows_out(flight.velocities_only);
+        let results = beats_of_results(&host.variant(), bodies, rows)[0];
         let mut impulses = std::mem::take(&mut streams[0]).into_vec();
         streams[0] = impulses.split_off(impulses.len() - results).into();
         let pair = |low, high| u64::from(host.control(low)) | (u64::from(host.control(high)) << 32);
@@ -232,7 +244,7 @@ impl Machine {
         let work = u64::from(host.control(control::WORK_CYCLES));
         let waits = u64::from(host.control(control::WAIT_CYCLES));
         Outcome {
-            bodies: unpack(&host.variant(), &streams, bodies),
+            bodies: unpack(&host.variant(), &streams, (bodies, rows)),
             impulses,
             cycles,
             // A board without power reads as all ones.
@@ -255,7 +267,7 @@ impl Machine {
     /// Runs a step until its results are in memory. The board alone computes.
     pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
         step.write_arguments(&self.host);
-        let mut flight = Flight::default();
+        let mut flight = Flight::of(step);
         let beats = beats_out(&self.host.variant(), step);
         self.arm(&mut flight, &beats);
         self.start();

@@ -225,11 +225,14 @@ pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
 }
 
 /// The step with each extension of `float` whose bit is set: a friction for each collision, a warm start,
-/// impulses that go out, a mass of each body. Another design has the masses alone; a board without them ignores
-/// them.
+/// impulses that go out, a mass of each body, and with two bits no poses. Another design has the last two alone;
+/// a board without the masses ignores them.
 pub(crate) fn extended(mut step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
     let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
     let has = |bit: u8| bits >> bit & 1 == 1;
+    if has(4) && has(5) {
+        (step.integrate, step.velocities_only) = (false, true);
+    }
     if has(3) {
         // A body of the static shape has no mass, and a shape beyond the table does not matter.
         let mass = |(n, body): (usize, &Body)| match body.shape {
@@ -264,7 +267,7 @@ pub(crate) fn begin(
 ) -> (Flight, Vec<Vec<u64>>) {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
-    let mut flight = Flight::default();
+    let mut flight = Flight::of(step);
     machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     let mut addresses = Vec::new();
@@ -290,7 +293,7 @@ pub(crate) fn begin(
 pub(crate) fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
-    let mut flight = Flight::default();
+    let mut flight = Flight::of(step);
     machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     machine.send(&mut flight, &step.packed(&variant));

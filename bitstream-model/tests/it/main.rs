@@ -18,4 +18,5 @@ mod scatter_gather;
 mod shortcuts;
 mod shortcuts_buffers;
 mod shortcuts_warm;
+mod velocities_only;
 mod windowed;

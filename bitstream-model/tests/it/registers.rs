@@ -418,8 +418,8 @@ fn misread_identity_is_impossible_on_a_live_board() {
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
     assert_eq!(host.control(control::VERSION), 0x0001_0002);
     assert_eq!(host.control(control::PROFILE), 1);
-    // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction, warm start.
-    assert_eq!(host.control(control::FEATURES), 0b1_1110_1011);
+    // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction, warm start, no poses.
+    assert_eq!(host.control(control::FEATURES), 0b101_1110_1011);
     assert_eq!(host.control(control::CHANNELS), 0x0404);
     // 16 bytes are 2^4.
     assert_eq!(host.control(control::MM2S_WIDTHS), 0x4444);

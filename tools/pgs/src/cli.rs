@@ -14,6 +14,7 @@ Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve vectors/one_cube --compare
+  pgs detect --input vectors/full_step186 --compare
   pgs compare float half               how far two builds of the board diverge
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
@@ -87,9 +88,9 @@ pub(crate) fn parse(
 /// The common options that a verb reads.
 fn reads(verb: &Verb) -> Reads {
     Reads {
-        board: !matches!(verb, Verb::Model(_) | Verb::Load(_)),
+        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_)),
         emulated_memory: matches!(verb, Verb::Serve(_)),
-        manager: !matches!(verb, Verb::Model(_)),
+        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_)),
         accelerator: match verb {
             Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
                 true
@@ -168,6 +169,7 @@ mod tests {
             "pgs solve x --memory uio --board uio",
             "pgs model",
             "pgs load x",
+            "pgs detect --input x",
         ] {
             parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
         }

@@ -101,7 +101,9 @@ impl Parameters {
     #[must_use]
     pub fn extensions(&self) -> Extensions {
         let possible = Extensions::possible(&self.variant());
-        Extensions { warm_start: self.warm_start == WarmStart::Built, ..possible }
+        let warm_start = self.warm_start == WarmStart::Built;
+        // The Verilog always takes poses in.
+        Extensions { warm_start, velocities_only: false, ..possible }
     }
 
     /// Cycles from an address to the velocity or the impulses.

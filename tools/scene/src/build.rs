@@ -1,9 +1,9 @@
 //! Builds the scene and holds its bodies and collisions.
 
 use pgs_support::float_env::standard;
-use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
+use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-use crate::detect::{Detector, Geometries};
+use crate::detect::{self, BroadPhase, DetectionTimes, Detector, Geometries};
 use crate::{CUBE_HALF_EXTENT, GROUND, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
@@ -13,8 +13,8 @@ pub const DROP_MAX: f32 = 1000.0;
 const SPACING: f32 = 2.2;
 
 /// Indices into the shape table.
-const STATIC_SHAPE: u32 = 0;
-const CUBE_SHAPE: u32 = 1;
+pub(crate) const STATIC_SHAPE: u32 = 0;
+pub(crate) const CUBE_SHAPE: u32 = 1;
 
 /// The inverse inertia of the cubes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -96,8 +96,7 @@ impl Scene {
                 }
             }
         }
-        let cube = (Shape::isotropic(1.0, options.inertia.inverse()), Geometry::CUBE);
-        Ok(Self::on_ground(&[cube], bodies))
+        Ok(Self::on_ground(&[cube(options.inertia)], bodies))
     }
 
     /// Puts `bodies` on the ground; their shapes are numbered from 1 in the order of `kinds`.
@@ -158,7 +157,7 @@ impl Scene {
     /// Sets the number of threads for detection, the caller's included; no result depends on it.
     /// The default is the machine's number, up to eight.
     pub fn set_threads(&mut self, threads: usize) {
-        self.detector = Detector::with_threads(threads.max(1));
+        self.detector.set_threads(threads.max(1));
     }
 
     /// Detects the collisions of the current poses, sorted by body A, then body B.
@@ -184,6 +183,31 @@ impl Scene {
         collisions
     }
 
+    /// Chooses the broad phase of later detections; no result depends on it.
+    pub fn set_broad_phase(&mut self, broad_phase: BroadPhase) {
+        self.detector.set_broad_phase(broad_phase);
+    }
+
+    /// The times of the last [`detect`](Self::detect).
+    #[must_use]
+    pub fn detection_times(&self) -> DetectionTimes {
+        self.detector.times()
+    }
+
+    /// The pairs of bodies that the broad phase of the last [`detect`](Self::detect) found: their
+    /// bounding boxes are at most 2.1 cm apart along each axis. The lower index comes first, the
+    /// list is sorted, and the ground has no part in it.
+    pub fn pairs(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.detector.pairs()
+    }
+
+    /// All contact points of two bodies, on the surface of `b`: [`detect`](Self::detect) chooses
+    /// up to four of them. None if the pair is none of its kind: the ground, body 0, can only be `a`.
+    #[must_use]
+    pub fn all_points(&self, a: u32, b: u32) -> Option<Vec<Contact>> {
+        standard(|| detect::all_points(&self.bodies, Geometries(&self.geometries), a, b))
+    }
+
     /// Gives each collision a friction of its own from now on: the geometric mean of the frictions of
     /// both shapes, one for each of [`shapes`](Self::shapes).
     pub fn set_frictions(&mut self, frictions: &[f32]) {
@@ -197,6 +221,11 @@ pub(crate) fn check_drop(drop: f32) -> Result<f32, SceneError> {
         true => Ok(drop),
         false => Err(SceneError::Drop { found: drop, most: DROP_MAX }),
     }
+}
+
+/// The cubes' shape.
+pub(crate) fn cube(inertia: Inertia) -> (Shape, Geometry) {
+    (Shape::isotropic(1.0, inertia.inverse()), Geometry::CUBE)
 }
 
 /// A body at rest, with its axes along the world's.

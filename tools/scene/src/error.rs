@@ -34,6 +34,25 @@ pub enum SceneError {
         /// Largest height, m.
         most: f32,
     },
+    /// Body 0 is not the ground.
+    #[error(
+        "expected body 0 to be the ground, level and with its centre at [0.0, -400.0, 0.0], found {}",
+        found.map_or_else(|| "no bodies".to_owned(), |found| format!("a body at {found:?}"))
+    )]
+    Ground {
+        /// Its position, m; none without bodies.
+        found: Option<[f32; 3]>,
+    },
+    /// A body is nowhere, or turned in no way.
+    #[error("body {body}: expected {what}, found {found:?}")]
+    Pose {
+        /// Index of the body.
+        body: usize,
+        /// The expectation.
+        what: &'static str,
+        /// The numbers, m for a position.
+        found: Vec<f32>,
+    },
     /// No spheres, or too many.
     #[error("expected 1 to {most} spheres, found {found}")]
     Spheres {

@@ -16,7 +16,8 @@
 //! # Ok::<(), scene::SceneError>(())
 //! ```
 //!
-//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes and capsules of several masses instead.
+//! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes, capsules, cylinders and convex hulls of
+//! several masses instead, and [`Scene::of_cubes`] has any poses.
 //! [`Spheres`] is an irregular pile, for tests of the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
@@ -29,21 +30,25 @@ mod detect;
 mod error;
 #[cfg(test)]
 mod fixtures;
+mod frames;
 mod geometry;
 mod grid;
+mod hull;
 mod measure;
+mod poses;
 mod random;
 mod rotation;
 mod shapes;
 mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
-pub use detect::MARGIN;
+pub use detect::{BroadPhase, DetectionTimes, MARGIN};
 pub use error::SceneError;
+pub use frames::{StepClock, interpolate};
 pub use geometry::Geometry;
 pub use grid::Grid;
 pub use measure::{
-    KineticEnergy, Momentum, Penetration, carry_along, ground_pairs, kinetic_energy,
+    KineticEnergy, Momentum, Penetration, axes, carry_along, ground_pairs, kinetic_energy,
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };

@@ -26,13 +26,6 @@ impl SplitMix64 {
         usize::try_from((u128::from(self.next()) * end as u128) >> 64).unwrap_or(0)
     }
 
-    /// From 0 to 7.
-    pub(crate) fn below_eight(&mut self) -> u32 {
-        #[allow(clippy::cast_possible_truncation, reason = "three bits")]
-        let number = (self.next() >> 61) as u32;
-        number
-    }
-
     /// From 0 up to, and without, 1.
     pub(crate) fn unit(&mut self) -> f32 {
         // 24 bits are exact in an f32.
@@ -63,7 +56,7 @@ mod tests {
         let mut random = SplitMix64::new(3);
         let (mut eight, mut least, mut most) = ([false; 8], 1.0_f32, -1.0_f32);
         for _ in 0..1000 {
-            eight[usize::try_from(random.below_eight()).expect("small")] = true;
+            eight[random.below(8)] = true;
             let (unit, sign) = (random.unit(), random.sign());
             assert!((0.0..1.0).contains(&unit) && (-1.0..1.0).contains(&sign), "{unit} {sign}");
             (least, most) = (least.min(sign), most.max(sign));

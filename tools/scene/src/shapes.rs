@@ -5,11 +5,14 @@ use zynq_pgs::{Body, Shape};
 
 use crate::build::{at_rest, check_drop};
 use crate::random::SplitMix64;
-use crate::{Geometry, Grid, Scene, SceneError};
+use crate::{Geometry, Grid, Scene, SceneError, hull};
 
-/// The kinds of bodies: geometry, and mass in kg. The inertia of boxes and capsules differs between
-/// axes.
-const KINDS: [(Geometry, f32); 8] = [
+/// The corners of the hulls.
+const HULL: [[f32; 3]; 12] = hull::cuboctahedron([0.9, 0.5, 0.6]);
+
+/// The kinds of bodies: geometry, and mass in kg. The inertia differs between axes except for cubes
+/// and spheres.
+const KINDS: [(Geometry, f32); 12] = [
     (Geometry::Box { half_extents: [0.6; 3] }, 1.0),
     (Geometry::Box { half_extents: [0.6; 3] }, 3.0),
     (Geometry::Sphere { radius: 0.6 }, 0.5),
@@ -18,10 +21,15 @@ const KINDS: [(Geometry, f32); 8] = [
     (Geometry::Box { half_extents: [0.5, 0.25, 1.0] }, 2.0),
     (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 1.0),
     (Geometry::Capsule { half_height: 0.6, radius: 0.4 }, 4.0),
+    (Geometry::Cylinder { half_height: 0.5, radius: 0.5 }, 1.0),
+    (Geometry::Cylinder { half_height: 0.5, radius: 0.5 }, 3.0),
+    (Geometry::Hull { points: &HULL }, 1.0),
+    (Geometry::Hull { points: &HULL }, 2.0),
 ];
 
 /// Frictions of the ground and of the kinds: cubes grip, spheres and capsules slide.
-pub const SHAPE_FRICTIONS: [f32; 1 + KINDS.len()] = [0.8, 0.9, 0.9, 0.3, 0.3, 0.6, 0.6, 0.2, 0.2];
+pub const SHAPE_FRICTIONS: [f32; 1 + KINDS.len()] =
+    [0.8, 0.9, 0.9, 0.3, 0.3, 0.6, 0.6, 0.2, 0.2, 0.5, 0.5, 0.7, 0.7];
 
 /// Distance between the centres of neighbours, m: no two bodies touch in any orientation.
 const SPACING: f32 = 2.4;
@@ -45,12 +53,12 @@ impl Default for ShapesOptions {
 }
 
 impl Scene {
-    /// Builds a pile of cubes, spheres, boxes and capsules of several masses, at rest: on a lattice
-    /// about the origin, each layer half a distance beside the one below, with random shapes and
-    /// orientations. The same seed gives the same bits everywhere.
+    /// Builds a pile of cubes, spheres, boxes, capsules, cylinders and convex hulls of several
+    /// masses, at rest: on a lattice about the origin, each layer half a distance beside the one
+    /// below, with random shapes and orientations. The same seed gives the same bits everywhere.
     ///
-    /// Boxes of 1 x 0.5 x 2 m and capsules have no isotropic inertia: only a bitstream with world
-    /// inertia takes them.
+    /// All but cubes and spheres have no isotropic inertia: only a bitstream with world inertia
+    /// takes them.
     ///
     /// # Errors
     ///
@@ -76,9 +84,9 @@ impl Scene {
                         SPACING * (0.5 + f32::from(j)) + drop,
                         centred(k, z) + shift,
                     ];
-                    const { assert!(KINDS.len() == 8) };
-                    // Shape 0 is the ground's.
-                    let mut body = at_rest(position, 1 + random.below_eight());
+                    // Shape 0 is the ground's; the number of kinds is small.
+                    let kind = u32::try_from(random.below(KINDS.len())).unwrap_or(0);
+                    let mut body = at_rest(position, 1 + kind);
                     body.pose.orientation = orientation(&mut random);
                     bodies.push(body);
                 }
@@ -116,24 +124,22 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_is_there_and_half_of_them_are_not_isotropic() {
+    fn every_kind_is_there_and_two_thirds_of_them_are_not_isotropic() {
         let scene = scene("10x10x10", 0.0, 1);
-        assert_eq!(scene.shapes().len(), 9);
-        assert_eq!(scene.geometries().len(), 9);
+        assert_eq!(scene.shapes().len(), 13);
+        assert_eq!(scene.geometries().len(), 13);
         assert_eq!(scene.bodies().len(), 1001);
-        for kind in 1..9 {
+        for kind in 1..13 {
             let count = scene.bodies().iter().filter(|body| body.shape == kind).count();
-            assert!((80..170).contains(&count), "{count} of kind {kind}");
+            assert!((50..120).contains(&count), "{count} of kind {kind}");
         }
         let turned = |shape: &&Shape| {
             shape.inverse_inertia.iter().any(|k| k.to_bits() != shape.inverse_inertia[0].to_bits())
         };
-        assert_eq!(scene.shapes().iter().filter(turned).count(), 4);
+        assert_eq!(scene.shapes().iter().filter(turned).count(), 8);
         let names: Vec<_> = scene.geometries().iter().flatten().map(Geometry::name).collect();
-        assert_eq!(
-            names[..],
-            ["cube", "cube", "sphere", "sphere", "box", "box", "capsule", "capsule"]
-        );
+        let expected = ["cube", "sphere", "box", "capsule", "cylinder", "hull"];
+        assert_eq!(names, expected.map(|name| [name, name]).concat());
     }
 
     #[test]
@@ -190,6 +196,19 @@ mod tests {
             Geometry::Capsule { half_height, radius } => {
                 length(x, y - y.clamp(-half_height, half_height), z) - radius
             }
+            Geometry::Cylinder { half_height, radius } => {
+                let [dx, dy] = [length(x, 0.0, z) - radius, y.abs() - half_height];
+                length(dx.max(0.0), dy.max(0.0), 0.0) + dx.max(dy).min(0.0)
+            }
+            Geometry::Hull { points } => {
+                let hull = hull::polyhedron(points).expect("a hull");
+                let point = parry3d::math::Vector::new(x, y, z);
+                let above = hull.faces().iter().map(|face| {
+                    let corner = hull.vertices_adj_to_face()[face.first_vertex_or_edge as usize];
+                    face.normal.dot(point - hull.points()[corner as usize])
+                });
+                above.fold(f32::NEG_INFINITY, f32::max)
+            }
             Geometry::Box { half_extents: [hx, hy, hz] } => {
                 let [dx, dy, dz] = [x.abs() - hx, y.abs() - hy, z.abs() - hz];
                 let inside = dx.max(dy).max(dz).min(0.0);
@@ -243,8 +262,8 @@ mod tests {
             }
         }
         assert!(shallow > 100, "{shallow}");
-        // The ground and four kinds of bodies, each with each of the four.
-        assert_eq!(kinds.len(), 20, "{kinds:?}");
+        // The ground and six kinds of bodies, each with each of the six.
+        assert_eq!(kinds.len(), 42, "{kinds:?}");
     }
 
     #[test]
@@ -255,6 +274,6 @@ mod tests {
         let inertias = scene.shapes().iter().flat_map(|shape| shape.inverse_inertia);
         let words: Vec<u32> = inertias.map(f32::to_bits).collect();
         let found = digest(words.into_iter().chain(bits(scene.detect())));
-        assert_eq!(found, "28968f8797c25c60");
+        assert_eq!(found, "0be5157a2fdd88bc");
     }
 }

@@ -3,10 +3,10 @@
 use super::array::{Array, Row, beat_of};
 use super::striping::{PerStream, STREAMS_MAX};
 use crate::stream::Stream;
-use pgs_interface::record::{Beat, result};
+use pgs_interface::record::{Beat, result, velocity_result};
 
 /// A result fills whole beats, even with two rows in a beat.
-const _: () = assert!(result::ROWS.is_multiple_of(2));
+const _: () = assert!(result::ROWS.is_multiple_of(2) && velocity_result::ROWS.is_multiple_of(2));
 
 /// The results while they are being sent.
 #[derive(Debug, Clone, Copy)]
@@ -40,8 +40,13 @@ impl Results {
         self.array.records_in(room) - self.done
     }
 
+    /// Records that are still to be sent.
+    pub(crate) fn left(&self) -> usize {
+        self.array.records - self.done
+    }
+
     /// Sends a record, for which there must be room; returns the sum of its words.
-    pub(crate) fn send(&mut self, rows: &[Row; result::ROWS], streams: &mut [Stream]) -> u32 {
+    pub(crate) fn send(&mut self, rows: &[Row], streams: &mut [Stream]) -> u32 {
         let mut sum = 0_u32;
         if self.array.rows_per_beat == 1 {
             for row in rows {
@@ -119,7 +124,7 @@ mod tests {
         let mut streams = narrow;
         let mut number = 0;
         for _ in 0..3 {
-            let rows = std::array::from_fn(|_| {
+            let rows: [Row; result::ROWS] = std::array::from_fn(|_| {
                 number += 1;
                 [number; 4]
             });

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::StreamBeat;
 use crate::config::BoardConfig;
 use pgs_interface::control::{REGISTERS, SHAPE_TABLE};
-use pgs_interface::record::result;
+use pgs_interface::record::{result, velocity_result};
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// The first difference between the hardware and the model.
@@ -140,16 +140,24 @@ fn first_word(model: &StreamBeat, hardware: &StreamBeat) -> Option<(usize, [u32;
     words.map(|(word, (m, h))| (word, [m, h])).find(|(_, [m, h])| !same_number(*m, *h))
 }
 
-/// The first difference between the beats number `at` of a stream out. The stream of the impulses has
-/// `impulses` beats of them in front of its results.
+/// The beats that a step sends.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sent {
+    /// Beats of impulses in front of the results, on their stream.
+    pub(super) impulses: usize,
+    /// Whether the results are velocities alone.
+    pub(super) velocities_only: bool,
+}
+
+/// The first difference between the beats number `at` of a stream out.
 pub(super) fn first_difference(
     config: &BoardConfig,
-    stream: usize,
-    (impulses, at): (usize, usize),
+    sent: &Sent,
+    (stream, at): (usize, usize),
     model: &StreamBeat,
     hardware: &StreamBeat,
 ) -> Option<(DifferencePlace, [u32; 2])> {
-    let impulses = if stream == IMPULSES_STREAM { impulses } else { 0 };
+    let impulses = if stream == IMPULSES_STREAM { sent.impulses } else { 0 };
     let lasts = [model.last, hardware.last].map(u32::from);
     let Some(result) = at.checked_sub(impulses) else {
         let word = first_word(model, hardware);
@@ -162,7 +170,10 @@ pub(super) fn first_difference(
     let streams = config.profile.stripes.results.streams;
     let turn = streams.iter().position(|of| usize::from(*of) == stream).unwrap_or(0);
     let beat = result * streams.len() + turn;
-    let (record, row) = (beat / result::ROWS, beat % result::ROWS);
+    // Velocities are the last rows of a whole result.
+    let first = if sent.velocities_only { result::ROWS - velocity_result::ROWS } else { 0 };
+    let rows = result::ROWS - first;
+    let (record, row) = (beat / rows, first + beat % rows);
     if let Some((word, values)) = first_word(model, hardware) {
         return Some((DifferencePlace::Word { record, row, word }, values));
     }

@@ -14,8 +14,8 @@ mod history;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use self::difference::first_difference;
 pub use self::difference::{Difference, DifferencePlace, same_number};
+use self::difference::{Sent, first_difference};
 use self::history::History;
 use super::{Clocked, ExternalAccelerator, ExternalError, ModelAccelerator, Offer, StreamBeat};
 use crate::config::{BoardConfig, ConfigError};
@@ -66,8 +66,8 @@ pub struct LockStep {
     /// Beats of each stream that the hardware has taken and the model has yet to take.
     owed: Vec<VecDeque<StreamBeat>>,
     results: Vec<Results>,
-    /// Beats of impulses that the step sends in front of its results.
-    impulses: usize,
+    /// The beats that the step sends.
+    sent: Sent,
     /// Clocks since the last start or reset.
     cycle: u64,
     busy: bool,
@@ -113,7 +113,7 @@ impl LockStep {
             player,
             owed: inputs,
             results: outputs,
-            impulses: 0,
+            sent: Sent::default(),
             cycle: 0,
             busy: false,
             model_busy: false,
@@ -150,16 +150,23 @@ impl LockStep {
         self.nan = false;
     }
 
-    /// Beats of impulses that a step with the model's arguments sends.
-    fn impulses_of_step(&mut self) -> Result<usize, ExternalError> {
+    /// The beats that a step with the model's arguments sends.
+    fn sent_by_step(&mut self) -> Result<Sent, ExternalError> {
+        let can = self.config.built_extensions();
         let mut read = |register: Register| self.model.read(register.offset);
-        if !(self.config.built_extensions().warm_start && flags::IMPULSES_OUT.is_set(read(FLAGS)?))
-        {
-            return Ok(0);
-        }
-        let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];
-        let collisions = read(COLLISIONS)? as usize;
-        Ok(kinds.iter().filter(|iterations| **iterations > 0).count().saturating_mul(collisions))
+        let set = read(FLAGS)?;
+        let velocities_only = can.velocities_only
+            && flags::VELOCITIES_ONLY.is_set(set)
+            && !flags::INTEGRATE.is_set(set);
+        let kinds = match can.warm_start && flags::IMPULSES_OUT.is_set(set) {
+            true => {
+                let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];
+                kinds.iter().filter(|iterations| **iterations > 0).count()
+            }
+            false => 0,
+        };
+        let impulses = kinds.saturating_mul(read(COLLISIONS)? as usize);
+        Ok(Sent { impulses, velocities_only })
     }
 
     /// Lets the model run on the beats that the hardware has taken.
@@ -185,8 +192,8 @@ impl LockStep {
             while let (Some(model), Some((hardware, cycle))) =
                 (results.model.front(), results.hardware.front())
             {
-                let at = (self.impulses, results.compared);
-                let found = first_difference(&self.config, stream, at, model, hardware);
+                let at = (stream, results.compared);
+                let found = first_difference(&self.config, &self.sent, at, model, hardware);
                 if let Some((place, values)) = found {
                     let cycle = *cycle;
                     return self.differs(place, cycle, values);
@@ -270,7 +277,7 @@ impl ExternalAccelerator for LockStep {
         let starts = offset == AP_CTRL.offset && ap_ctrl::START.is_set(value) && !self.busy;
         if starts {
             self.forget_beats();
-            self.impulses = self.impulses_of_step()?;
+            self.sent = self.sent_by_step()?;
             self.history.start();
             self.cycle = 0;
             self.busy = true;

@@ -360,6 +360,7 @@ impl OpenBoard {
             "body_capacity": can.body_capacity,
             "shape_capacity": can.shape_capacity,
             "streamed_masses": can.extensions.streamed_masses,
+            "velocities_only": can.extensions.velocities_only,
             "memory_bytes": can.memory_bytes,
             "bytes_per_body": can.bytes_per_body,
             "bytes_per_collision": can.bytes_per_collision,

@@ -22,8 +22,8 @@ pub(crate) struct BuildArgs {
     /// profile's]
     #[arg(long, value_parser = choice("arithmetic", |build| build.arithmetic))]
     arithmetic: Option<Precision>,
-    /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every
-    /// body [default: isotropic]
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with
+    /// every body [default: isotropic]
     #[arg(long, value_parser = choice("inertia", |build| build.inertia))]
     inertia: Option<Inertia>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]

@@ -5,6 +5,7 @@ use bitstream_model::interface::profile::Inertia as Form;
 use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
+use step_folder::npy;
 use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
 
@@ -20,9 +21,9 @@ const DROP: f32 = 1.0;
 /// The scene and its size.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
-    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules
-    /// of several masses), which need a board with world inertia: `pgs run` and `pgs formats` build
-    /// such an emulated board themselves.
+    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules,
+    /// cylinders, convex hulls of several masses), which need a board with world inertia: `pgs run`
+    /// and `pgs formats` build such an emulated board themselves.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]
@@ -68,6 +69,19 @@ fn drop_height(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Refuses a grid that no board takes, before memory is allocated for it.
+pub(crate) fn check_rows(grid: Grid) -> Result<(), Failure> {
+    let bodies = u64::from(grid.cubes()) + 1;
+    if bodies <= npy::ROWS_MAX as u64 {
+        return Ok(());
+    }
+    let error = format!(
+        "a grid of {grid} is {bodies} bodies with the ground, no board takes more than {}",
+        npy::ROWS_MAX
+    );
+    Err(Failure::input(error).next("give a smaller --grid"))
+}
+
 impl SceneArgs {
     /// Builds the scene. Detection uses as many threads as the emulated board may.
     pub(crate) fn build(&self, board: &Build) -> Result<Scene, Failure> {
@@ -89,7 +103,8 @@ impl SceneArgs {
         Ok(scene)
     }
 
-    fn grid(&self) -> Grid {
+    /// Bodies along each axis.
+    pub(crate) fn grid(&self) -> Grid {
         let shapes = || Grid::new(10, 10, 10).unwrap_or_default();
         self.grid.unwrap_or_else(|| if self.is_cubes() { Grid::default() } else { shapes() })
     }
@@ -145,7 +160,7 @@ impl SceneArgs {
         let what = match self.scene {
             SceneName::Cubes => format!("cubes ({grid})"),
             SceneName::Shapes => {
-                format!("cubes, spheres, boxes and capsules ({grid}, seed {})", self.seed())
+                format!("bodies of six shapes ({grid}, seed {})", self.seed())
             }
         };
         let count = grouped(grid.cubes().into());

@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
+pub(crate) mod detect;
 pub(crate) mod faults;
 pub(crate) mod formats;
 pub(crate) mod list;
@@ -18,6 +19,7 @@ use clap::Subcommand;
 
 use self::check::CheckArgs;
 use self::compare::CompareArgs;
+use self::detect::DetectArgs;
 use self::faults::FaultsArgs;
 use self::formats::FormatsArgs;
 use self::list::ListArgs;
@@ -36,6 +38,7 @@ pub(crate) enum Verb {
     Run(RunArgs),
     Solve(SolveArgs),
     Compare(CompareArgs),
+    Detect(DetectArgs),
     Formats(FormatsArgs),
     Model(ModelArgs),
     Order(OrderArgs),
@@ -53,6 +56,7 @@ impl Verb {
             Self::Run(args) => run::run(args, common, out),
             Self::Solve(args) => solve::run(args, common, out),
             Self::Compare(args) => compare::run(args, common, out),
+            Self::Detect(args) => detect::run(args, common, out),
             Self::Formats(args) => formats::run(args, common, out),
             Self::Model(args) => model::run(args, common, out),
             Self::Order(args) => order::run(args, common, out),

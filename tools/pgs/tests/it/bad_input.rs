@@ -270,9 +270,15 @@ proptest! {
             }
             fs::write(&path, bytes).expect("the array");
         }
-        let output = pgs().arg("solve").arg(folder.path()).arg("--compare").args(STAGES[stage]).output();
-        let ran = Ran::from(output.expect("it starts"));
-        prop_assert!(matches!(ran.code, Some(0..=2)), "{damages:?}: {:?} {}", ran.code, ran.stderr);
-        prop_assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+        for (verb, options) in [("solve", STAGES[stage]), ("detect", &["--runs", "1", "--input"])] {
+            let mut pgs = pgs();
+            let output = pgs.arg(verb).arg("--compare").args(options).arg(folder.path()).output();
+            let ran = Ran::from(output.expect("it starts"));
+            prop_assert!(
+                matches!(ran.code, Some(0..=2)),
+                "{verb} {damages:?}: {:?} {}", ran.code, ran.stderr
+            );
+            prop_assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+        }
     }
 }

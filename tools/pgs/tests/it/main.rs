@@ -11,6 +11,7 @@ mod bad_input;
 mod check;
 mod command_line;
 mod compare;
+mod detect;
 mod documents;
 mod environment;
 mod faults;

@@ -39,6 +39,15 @@ impl Bounds {
             Geometry::Capsule { half_height, radius } => {
                 rows.map(|[_, y, _]| y.abs() * half_height + radius)
             }
+            Geometry::Cylinder { half_height, radius } => rows.map(|[_, y, _]| {
+                let across = 1.0 - y * y;
+                let across = if across > 0.0 { across.sqrt() } else { 0.0 };
+                y.abs() * half_height + across * radius
+            }),
+            Geometry::Hull { points } => rows.map(|[rx, ry, rz]| {
+                let along = |[x, y, z]: &[f32; 3]| ((rx * x + ry * y) + rz * z).abs();
+                points.iter().map(along).fold(0.0, f32::max)
+            }),
         };
         let finite = centre.iter().chain(&reach).all(|value| value.is_finite());
         if finite { Self { centre, reach } } else { Self::NONE }
@@ -74,6 +83,8 @@ mod tests {
     use super::*;
     use crate::fixtures::body;
 
+    const HULL: [[f32; 3]; 12] = crate::hull::cuboctahedron([0.9, 0.5, 0.6]);
+
     #[test]
     fn what_is_not_finite_takes_no_part() {
         let level = [0.0, 0.0, 0.0, 1.0];
@@ -94,14 +105,16 @@ mod tests {
             above in -0.03_f32..0.06,
             far in -4e3_f32..4e3,
             q in prop::array::uniform4(-1.0_f32..1.0),
-            kind in 0..3,
+            kind in 0..5,
         ) {
             let length = (((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]).sqrt();
             prop_assume!(length > 0.1);
             let geometry = match kind {
                 0 => Geometry::Box { half_extents: [1.0, 0.3, 0.7] },
                 1 => Geometry::Sphere { radius: 0.6 },
-                _ => Geometry::Capsule { half_height: 0.5, radius: 0.4 },
+                2 => Geometry::Capsule { half_height: 0.5, radius: 0.4 },
+                3 => Geometry::Cylinder { half_height: 0.5, radius: 0.4 },
+                _ => Geometry::Hull { points: &HULL },
             };
             let mut body = body([far, 0.0, -far], q.map(|value| value / length));
             body.pose.position[1] = Bounds::of(&body, geometry).reach[1] + above;

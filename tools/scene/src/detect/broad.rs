@@ -24,6 +24,16 @@ const _: () = assert!(GAP + SKIN <= GAP_MAX, "candidates are in neighbouring cel
 /// Smallest number of bodies for which a further thread speeds up the search.
 const SEARCHED_PER_THREAD: usize = 2048;
 
+/// The way in which pairs of bodies that may touch are found. Both ways find the same pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BroadPhase {
+    /// A grid of cells.
+    #[default]
+    Grid,
+    /// Sweep and prune, as the thesis describes it (section 2.2.1), on the calling thread alone.
+    Sweep,
+}
+
 /// The range of the bodies' movement and growth, along each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Drift {
@@ -121,6 +131,11 @@ impl Broad {
         &self.candidates
     }
 
+    /// The candidates of the last search.
+    pub(super) fn kept(&self) -> &[(u32, u32)] {
+        &self.candidates
+    }
+
     /// Searches for candidates.
     fn search(&mut self, bounds: &[Bounds], crew: &mut Crew) {
         #[cfg(test)]
@@ -202,6 +217,7 @@ fn sort_few(pairs: &mut [(u32, u32)]) {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::sweep::Sweep;
     use super::*;
 
     /// A change of a body from one step to the next.
@@ -239,10 +255,13 @@ mod tests {
             for (before, now) in self.broad.searched_bounds(bounds.len()).iter().zip(bounds) {
                 drift.add(before, now);
             }
-            let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
-            let candidates = self.broad.candidates(bounds, &drift, &mut self.crew);
-            candidates.iter().filter(near).copied().collect()
+            near(bounds, self.broad.candidates(bounds, &drift, &mut self.crew))
         }
+    }
+
+    fn near(bounds: &[Bounds], candidates: &[(u32, u32)]) -> Vec<(u32, u32)> {
+        let near = |&&(a, b): &&(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
+        candidates.iter().filter(near).copied().collect()
     }
 
     fn every_pair(bounds: &[Bounds]) -> Vec<(u32, u32)> {
@@ -267,7 +286,7 @@ mod tests {
         ) {
             let mut bounds = vec![Bounds::NONE];
             bounds.extend(bodies.into_iter().map(|(centre, reach)| Bounds { centre, reach }));
-            let mut kept = Kept::default();
+            let (mut kept, mut sweep) = (Kept::default(), Sweep::default());
             for (fall, events) in steps {
                 for body in &mut bounds {
                     body.centre = std::array::from_fn(|axis| body.centre[axis] + fall[axis]);
@@ -293,7 +312,9 @@ mod tests {
                         Event::Turn(_) => {}
                     }
                 }
-                prop_assert_eq!(kept.pairs(&bounds), every_pair(&bounds));
+                let expected = every_pair(&bounds);
+                prop_assert_eq!(kept.pairs(&bounds), &*expected);
+                prop_assert_eq!(near(&bounds, sweep.candidates(&bounds)), expected);
             }
         }
     }

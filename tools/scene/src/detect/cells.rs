@@ -116,7 +116,7 @@ impl Cells {
 }
 
 /// Merges the sorted `strays` into the sorted `order`; no two entries are equal.
-fn merge(order: &mut Vec<(u64, u32)>, strays: &[(u64, u32)]) {
+pub(super) fn merge<T: Copy + Ord>(order: &mut Vec<T>, strays: &[T]) {
     let mut kept = order.len();
     order.extend_from_slice(strays);
     let mut place = order.len();

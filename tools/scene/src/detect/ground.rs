@@ -14,6 +14,10 @@ use crate::{GROUND, Geometry, rotation};
 /// From the body (B) down to the ground (A).
 const NORMAL: [f32; 3] = [0.0, -1.0, 0.0];
 
+/// Sine of the tilt up to which a cylinder stands on a square fixed in its rim. The lowest point of
+/// the rim, which would turn with every tremor, is at most 0.3 % of the radius lower.
+const UPRIGHT: f32 = 0.01;
+
 /// The contact points of a body, as they are collected.
 #[derive(Default)]
 struct Points {
@@ -22,12 +26,26 @@ struct Points {
 }
 
 impl Points {
-    /// Adds a point that is near enough; a body has at most four.
+    /// Adds a point that is near enough; keeps the four lowest, and the earlier ones in a tie.
     fn offer(&mut self, point: [f32; 3]) {
         // In this form a NaN is no contact.
-        if point[1] <= MARGIN && point.iter().all(|value| value.is_finite()) {
-            self.contacts[self.count] = Contact { point, distance: point[1] };
+        if !(point[1] <= MARGIN && point.iter().all(|value| value.is_finite())) {
+            return;
+        }
+        let contact = Contact { point, distance: point[1] };
+        if let Some(free) = self.contacts.get_mut(self.count) {
+            *free = contact;
             self.count += 1;
+            return;
+        }
+        let [mut highest, others @ ..] = self.contacts.each_mut();
+        for other in others {
+            if other.distance >= highest.distance {
+                highest = other;
+            }
+        }
+        if contact.distance < highest.distance {
+            *highest = contact;
         }
     }
 }
@@ -44,6 +62,15 @@ pub(super) fn collide(index: u32, body: &Body, geometry: Geometry) -> Option<Col
             for end in [half_height, -half_height] {
                 let [x, y, z] = [0, 1, 2].map(|row| centre[row] + rows[row][1] * end);
                 points.offer([x, y - radius, z]);
+            }
+        }
+        Geometry::Cylinder { half_height, radius } => {
+            offer_rims(body, half_height, radius, &mut points);
+        }
+        Geometry::Hull { points: corners } => {
+            let rows = rotation::matrix(body.pose.orientation);
+            for corner in corners {
+                points.offer(placed(centre, &rows, *corner));
             }
         }
     }
@@ -74,13 +101,35 @@ fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
         corner[axis] = down;
         corner[u] = su * half_extents[u];
         corner[v] = sv * half_extents[v];
-        let mut point = [0.0; 3];
-        for row in 0..3 {
-            let [x, y, z] = rows[row];
-            point[row] = centre[row] + ((x * corner[0] + y * corner[1]) + z * corner[2]);
-        }
-        points.offer(point);
+        points.offer(placed(centre, &rows, corner));
     }
+}
+
+/// Offers the lowest point of either rim of a cylinder, and a square in the lower one.
+fn offer_rims(body: &Body, half_height: f32, radius: f32, points: &mut Points) {
+    let centre = body.pose.position;
+    let rows = rotation::matrix(body.pose.orientation);
+    // The vertical in the frame of the body, as far as it lies across the axis.
+    let [x, along, z] = rows[1];
+    let across = (x * x + z * z).sqrt();
+    let below = if along > 0.0 { -half_height } else { half_height };
+    let is_upright = across < UPRIGHT;
+    let (dx, dz) =
+        if is_upright { (radius, 0.0) } else { (-x / across * radius, -z / across * radius) };
+    for corner in [[dx, below, dz], [-dz, below, dx], [dz, below, -dx], [-dx, below, -dz]] {
+        points.offer(placed(centre, &rows, corner));
+    }
+    if !is_upright {
+        points.offer(placed(centre, &rows, [dx, -below, dz]));
+    }
+}
+
+/// A point of a body in the world.
+fn placed(centre: [f32; 3], rows: &[[f32; 3]; 3], [px, py, pz]: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|row| {
+        let [x, y, z] = rows[row];
+        centre[row] + ((x * px + y * py) + z * pz)
+    })
 }
 
 #[cfg(test)]
@@ -179,6 +228,53 @@ mod tests {
         assert_eq!(lying.count, 2, "on both");
         assert!((lying.contacts[0].point[2] - 0.6).abs() < 1e-6, "{lying:?}");
         assert!((lying.contacts[1].distance + 0.01).abs() < 1e-6, "{lying:?}");
+    }
+
+    #[test]
+    fn a_cylinder_stands_on_a_square_and_lies_on_a_line() {
+        let cylinder = Geometry::Cylinder { half_height: 0.6, radius: 0.4 };
+        let found = |y: f32, angle: f32| {
+            let (sin, cos) = (0.5 * angle).sin_cos();
+            super::collide(3, &cube([2.0, y, 0.0], [sin, 0.0, 0.0, cos]), cylinder)
+        };
+        let upright = found(0.59, 0.0).expect("contact");
+        assert_eq!(upright.count, 4, "on its rim");
+        for contact in upright.contacts {
+            let [x, y, z] = contact.point;
+            assert!(
+                (y + 0.01).abs() < 1e-6 && (((x - 2.0).powi(2) + z * z).sqrt() - 0.4).abs() < 1e-6
+            );
+        }
+        let quarter = std::f32::consts::FRAC_PI_2;
+        let lying = found(0.39, quarter).expect("contact");
+        assert_eq!(lying.count, 2, "on the ends of a line");
+        assert!(lying.contacts[..2].iter().all(|contact| (contact.distance + 0.01).abs() < 1e-6));
+        assert!(
+            (lying.contacts[0].point[2] - lying.contacts[1].point[2]).abs() > 1.19,
+            "{lying:?}"
+        );
+        // Tilted by 30 degrees, one way and head down: on the lowest point of a rim.
+        let tilt = std::f32::consts::FRAC_PI_6;
+        for angle in [tilt, -tilt, std::f32::consts::PI + tilt] {
+            let height = 0.6 * 0.866_025_4 + 0.4 * 0.5;
+            let tilted = found(height - 0.005, angle).expect("contact");
+            assert_eq!(tilted.count, 1, "{tilted:?}");
+            assert!((tilted.contacts[0].distance + 0.005).abs() < 1e-6, "{tilted:?}");
+        }
+        assert!(found(0.621, 0.0).is_none() && found(0.421, quarter).is_none());
+    }
+
+    #[test]
+    fn a_hull_lies_on_a_face_and_keeps_its_four_lowest_corners() {
+        const HULL: [[f32; 3]; 12] = crate::hull::cuboctahedron([0.9, 0.5, 0.6]);
+        let hull = Geometry::Hull { points: &HULL };
+        let level = [0.0, 0.0, 0.0, 1.0];
+        let flat = super::collide(1, &cube([0.0, 0.49, 0.0], level), hull).expect("contact");
+        assert_eq!(flat.count, 4);
+        assert!(flat.contacts.iter().all(|contact| (contact.distance + 0.01).abs() < 1e-6));
+        // Half inside the ground: every corner but the highest four is near.
+        let sunk = super::collide(1, &cube([0.0, 0.0, 0.0], level), hull).expect("contact");
+        assert!(sunk.contacts.iter().all(|contact| contact.distance < -0.4), "{sunk:?}");
     }
 
     #[test]

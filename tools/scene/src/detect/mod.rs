@@ -8,22 +8,28 @@ mod bounds;
 mod boxes;
 mod broad;
 mod cells;
+mod choice;
 mod ground;
 mod lanes;
 mod narrow;
 mod parry;
 mod points;
 mod reduce;
+mod sweep;
 
 use std::num::NonZero;
 use std::thread;
+use std::time::{Duration, Instant};
 
 use pgs_support::Crew;
 use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};
+pub use broad::BroadPhase;
 use broad::{Broad, Drift};
+pub(crate) use choice::all_points;
 use narrow::Narrow;
+use sweep::Sweep;
 
 use crate::Geometry;
 
@@ -38,6 +44,17 @@ const PAIRS_PER_THREAD: usize = 4096;
 const THREADS_UNASKED: usize = 8;
 /// Smallest number of bodies for which threads are started.
 const BODIES_FOR_THREADS: usize = 1024;
+
+/// The time of each part of a detection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DetectionTimes {
+    /// Bounding boxes, and contacts with the ground.
+    pub bounds: Duration,
+    /// Search for pairs of bodies.
+    pub broad: Duration,
+    /// Contacts of the pairs.
+    pub narrow: Duration,
+}
 
 /// The geometry of bodies, by index into the shape table; none for the ground.
 #[derive(Debug, Clone, Copy)]
@@ -58,6 +75,9 @@ pub(crate) struct Detector {
     crew: Crew,
     bounds: Vec<Bounds>,
     broad: Broad,
+    sweep: Sweep,
+    broad_phase: BroadPhase,
+    times: DetectionTimes,
     workers: Vec<Worker>,
 }
 
@@ -95,8 +115,35 @@ impl Detector {
             crew: Crew::default(),
             bounds: Vec::new(),
             broad: Broad::default(),
+            sweep: Sweep::default(),
+            broad_phase: BroadPhase::default(),
+            times: DetectionTimes::default(),
             workers: Vec::new(),
         }
+    }
+
+    /// Limits the threads of later detections, which keep nothing from earlier ones.
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        *self = Self { broad_phase: self.broad_phase, ..Self::with_threads(threads) };
+    }
+
+    /// Chooses the broad phase of later detections, which keep nothing from earlier ones.
+    pub(crate) fn set_broad_phase(&mut self, broad_phase: BroadPhase) {
+        *self = Self { broad_phase, ..Self::with_threads(self.threads) };
+    }
+
+    /// The times of the last detection.
+    pub(crate) fn times(&self) -> DetectionTimes {
+        self.times
+    }
+
+    /// The pairs whose bounding boxes were near in the last detection.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (u32, u32)> {
+        let candidates = match self.broad_phase {
+            BroadPhase::Grid => self.broad.kept(),
+            BroadPhase::Sweep => self.sweep.kept(),
+        };
+        near(&self.bounds, candidates)
     }
 
     /// Replaces `collisions` by the collisions of `bodies`, sorted by body A, then body B. Body 0 is
@@ -113,14 +160,20 @@ impl Detector {
             self.threads = self.crew.threads();
         }
         self.workers.resize_with(self.crew.threads(), Worker::default);
+        let begin = Instant::now();
         let drift = self.compute_bounds(bodies, geometries);
         collisions.clear();
         for worker in &self.workers {
             collisions.extend_from_slice(&worker.ground);
         }
 
-        let Self { crew, bounds, broad, workers, .. } = self;
-        let candidates = broad.candidates(bounds, &drift, crew);
+        let placed = Instant::now();
+        let Self { crew, bounds, broad, sweep, workers, .. } = self;
+        let candidates = match self.broad_phase {
+            BroadPhase::Grid => broad.candidates(bounds, &drift, crew),
+            BroadPhase::Sweep => sweep.candidates(bounds),
+        };
+        let searched = Instant::now();
         let (count, share) = shares(candidates.len(), crew, PAIRS_PER_THREAD);
         let workers = &mut workers[..count];
         for worker in &mut *workers {
@@ -139,6 +192,11 @@ impl Detector {
                 collisions.extend_from_slice(&worker.found);
             }
         }
+        self.times = DetectionTimes {
+            bounds: placed - begin,
+            broad: searched - placed,
+            narrow: searched.elapsed(),
+        };
     }
 
     /// Computes the bounds of all bodies and collides them with the ground; returns their drift
@@ -193,10 +251,15 @@ impl Worker {
         bounds: &[Bounds],
         candidates: &[(u32, u32)],
     ) {
-        let near = |&(a, b): &(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
-        let near = candidates.iter().copied().filter(near);
+        let near = near(bounds, candidates);
         self.narrow.collide(bodies, geometries, near, &mut self.found);
     }
+}
+
+/// The candidates whose boxes are near enough for a pair.
+fn near(bounds: &[Bounds], candidates: &[(u32, u32)]) -> impl Iterator<Item = (u32, u32)> {
+    let near = |&(a, b): &(u32, u32)| bounds[a as usize].near(&bounds[b as usize], GAP);
+    candidates.iter().copied().filter(near)
 }
 
 /// The number of shares and the size of each: one share per thread, none smaller than `least`.

@@ -7,12 +7,12 @@
 use parry3d::math::{Pose, Rotation, Vector};
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
-use parry3d::shape::{Ball, Capsule, Cuboid, PackedFeatureId, Shape};
+use parry3d::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, PackedFeatureId, Shape};
 use zynq_pgs::Body;
 
 use super::MARGIN;
 use super::points::MOST;
-use crate::Geometry;
+use crate::{Geometry, hull};
 
 /// Squared distance below which two points are the same, m². Clipping can reduce a line to one
 /// point, which parry returns twice.
@@ -34,11 +34,16 @@ pub(super) struct Place {
 pub(super) struct Parry {
     manifold: ContactManifold<(), ()>,
     places: [Place; MOST],
+    hulls: Hulls,
 }
 
 impl Default for Parry {
     fn default() -> Self {
-        Self { manifold: ContactManifold::new(), places: [Place::default(); MOST] }
+        Self {
+            manifold: ContactManifold::new(),
+            places: [Place::default(); MOST],
+            hulls: Hulls::default(),
+        }
     }
 }
 
@@ -85,12 +90,17 @@ impl Parry {
             contact_manifold_cuboid_cuboid(b_in_a, &a, &b, MARGIN, manifold);
             return Some(false);
         }
-        with_shape(a, |a| {
-            with_shape(b, |b| {
+        for geometry in [a, b] {
+            if let Geometry::Hull { points } = geometry {
+                self.hulls.add(points);
+            }
+        }
+        with_shape(a, &self.hulls, |a| {
+            with_shape(b, &self.hulls, |b| {
                 let parry = DefaultQueryDispatcher;
                 parry.contact_manifold_convex_convex(b_in_a, a, b, None, None, MARGIN, manifold)
             })
-        })
+        })??
         .ok()?;
         // parry adds the nearest point to the points of two features, last and without a feature.
         // For a flat-lying capsule that is any point of a line whose ends are already there.
@@ -108,13 +118,41 @@ impl Parry {
     }
 }
 
-/// Passes parry's shape of a geometry to `then`.
-fn with_shape<R>(geometry: Geometry, then: impl FnOnce(&dyn Shape) -> R) -> R {
-    match geometry {
+/// The polyhedra of the hulls seen so far, by their corners.
+#[derive(Default)]
+struct Hulls(Vec<(&'static [[f32; 3]], Option<ConvexPolyhedron>)>);
+
+impl Hulls {
+    fn find(&self, points: &'static [[f32; 3]]) -> Option<&Option<ConvexPolyhedron>> {
+        self.0.iter().find(|(known, _)| std::ptr::eq(*known, points)).map(|(_, hull)| hull)
+    }
+
+    fn add(&mut self, points: &'static [[f32; 3]]) {
+        if self.find(points).is_none() {
+            self.0.push((points, hull::polyhedron(points)));
+        }
+    }
+}
+
+impl std::fmt::Debug for Hulls {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} hulls", self.0.len())
+    }
+}
+
+/// Passes parry's shape of a geometry to `then`; `None` for a hull without a volume.
+fn with_shape<R>(
+    geometry: Geometry,
+    hulls: &Hulls,
+    then: impl FnOnce(&dyn Shape) -> R,
+) -> Option<R> {
+    Some(match geometry {
         Geometry::Box { half_extents } => then(&Cuboid::new(Vector::from_array(half_extents))),
         Geometry::Sphere { radius } => then(&Ball::new(radius)),
         Geometry::Capsule { half_height, radius } => then(&Capsule::new_y(half_height, radius)),
-    }
+        Geometry::Cylinder { half_height, radius } => then(&Cylinder::new(half_height, radius)),
+        Geometry::Hull { points } => then(hulls.find(points)?.as_ref()?),
+    })
 }
 
 fn pose(body: &Body) -> Pose {

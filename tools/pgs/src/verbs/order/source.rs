@@ -12,6 +12,7 @@ use super::OrderArgs;
 use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
+use crate::options::scenes;
 use crate::step_input;
 use step_folder::folder::Folder;
 use step_folder::npy::{self, Dimensions};
@@ -68,15 +69,7 @@ impl Source {
 
     /// Cubes, after some steps on the board.
     fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
-        let bodies = u64::from(args.grid.cubes()) + 1;
-        if bodies > npy::ROWS_MAX as u64 {
-            let error = format!(
-                "a grid of {} is {bodies} bodies with the ground, no board takes more than {}",
-                args.grid,
-                npy::ROWS_MAX
-            );
-            return Err(Failure::input(error).next("give a smaller --grid"));
-        }
+        scenes::check_rows(args.grid)?;
         let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         if args.steps > 0 {
