@@ -324,6 +324,7 @@ impl ExternalAccelerator for LockStep {
         if ended {
             // A wrong beat stops the hardware as it arrives. The model comes to that beat with the beats of the
             // other streams, which the hardware has not taken any more.
+            self.history.read(ERROR.offset);
             if self.hardware.read(ERROR.offset)? != 0 {
                 let offered = offer.beats.iter().zip(&clocked.taken);
                 for (owed, (beats, taken)) in self.owed.iter_mut().zip(offered) {
