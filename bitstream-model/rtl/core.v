@@ -1,6 +1,6 @@
 // The accelerator without its registers: beats in, beats out.
 //
-//   receivers -> loader ------------------------------------> velocities <-> contact, friction
+//   receivers -> bodies ------------------------------------> velocities <-> contact, friction
 //            \-> finder -> issue -> record registers -> contact / friction pipeline
 //            \-> integrator -> integration pipeline -> senders
 //
@@ -25,6 +25,7 @@ module core (
   input  wire         pair_friction,
   input  wire         warm_start,
   input  wire         impulses_out,
+  input  wire         streamed_masses,
   input  wire [31:0]  time_step,
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
@@ -92,7 +93,8 @@ module core (
   wire phase, slot_begins, loading, finding, passing, draining, begin_pass, integrating;
   wire friction, first_of_kind, last_contact, parity;
   wire warm, next_warm, sends, next_sends;
-  wire [1:0] loads, load_finished;
+  wire [1:0] loads;
+  wire       load_finished;
   wire issues, stalls, waits, enters, enter_finished;
   wire [3:0] sender_finished;
 
@@ -102,7 +104,7 @@ module core (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
     .warm_start(takes_impulses), .impulses_out(gives_impulses),
-    .loads(|loads), .load_finished(&load_finished),
+    .loads(|loads), .load_finished(load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
     .busy(busy), .done(done), .phase(phase), .slot_begins(slot_begins), .loading(loading), .finding(finding), .passing(passing),
@@ -135,7 +137,7 @@ module core (
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
-      receiver #(.CHANNEL(k)) stream (
+      receiver #(.CHANNEL(k), .WORLD_INERTIA(DESIGN_WORLD_INERTIA)) stream (
         .clk(clk), .stop(reset | error), .start(start), .clear(clear),
         .bodies(bodies), .collisions(collisions),
         .passes(passes), .friction_passes(friction_passes), .warm_start(takes_impulses),
@@ -153,38 +155,28 @@ module core (
     sum_received  <= received_low + received_high;
   end
 
-  // ---- Load, and the properties of the bodies
+  // ---- Load, and the mass properties of the bodies
 
-  wire [1:0]       load_ready, load_write, load_error, shape_moves;
-  wire [BODY-1:0]  load_address [0:1];
-  wire [7:0]       load_shape [0:1];
-  wire [191:0]     load_velocity [0:1];
-  wire [SHAPE-1:0] load_lookup [0:1];
-  wire [19:0]      load_error_body [0:1];
-  wire [63:0]      properties [0:1];
-  generate
-    for (k = 0; k < 2; k = k + 1) begin : g_loader
-      loader #(.BODY(BODY), .SHAPE(SHAPE), .ODD(k)) side (
-        .clk(clk), .start(clear), .run(loading), .bodies(bodies), .kinematic(kinematic),
-        .linear_there(there[2*k]), .linear(head[2*k]),
-        .angular_there(there[2*k+1]), .angular(head[2*k+1]),
-        .ready(load_ready[k]), .other_ready(load_ready[1-k]), .pop(loads[k]), .finished(load_finished[k]),
-        .lookup(load_lookup[k]), .lookup_moves(shape_moves[k]),
-        .write(load_write[k]), .address(load_address[k]), .shape(load_shape[k]), .velocity(load_velocity[k]),
-        .error(load_error[k]), .error_body(load_error_body[k])
-      );
-    end
-  endgenerate
-
-  wire [BODY-1:0] shape_of_a, shape_of_b, entering;
-  body_shapes #(.BODIES(BODIES), .BODY(BODY), .SHAPE(SHAPE)) shapes (
-    .clk(clk), .table_write(shape_write), .table_address(shape_address), .table_in(shape_in),
-    .loading(~finding & ~integrating),
-    .write_a(load_write[0]),
-    .address_a(load_write[0] ? load_address[0] : integrating ? entering : shape_of_a),
-    .shape_a(load_shape[0]), .lookup_a(load_lookup[0]), .properties_a(properties[0]), .moves_a(shape_moves[0]),
-    .write_b(load_write[1]), .address_b(load_write[1] ? load_address[1] : shape_of_b),
-    .shape_b(load_shape[1]), .lookup_b(load_lookup[1]), .properties_b(properties[1]), .moves_b(shape_moves[1])
+  localparam PROPERTIES = (DESIGN_WORLD_INERTIA != 0) ? 224 : 64;   // bits of a body's mass and inertia
+  wire [1:0]            load_write;
+  wire [BODY-1:0]       load_address_a, load_address_b;
+  wire [191:0]          load_velocity_a, load_velocity_b;
+  wire                  load_error;
+  wire [19:0]           load_error_body;
+  wire [BODY-1:0]       next_a, next_b, entering;
+  wire [PROPERTIES-1:0] properties_a, properties_b;
+  wire                  has_mass_a, has_mass_b;
+  bodies #(
+    .WORLD_INERTIA(DESIGN_WORLD_INERTIA), .BODIES(BODIES), .BODY(BODY), .SHAPE(SHAPE), .PROPERTIES(PROPERTIES)
+  ) loaded (
+    .clk(clk), .clear(clear), .table_write(shape_write), .table_address(shape_address), .table_in(shape_in),
+    .loading(loading), .finding(finding), .integrating(integrating),
+    .bodies(bodies), .kinematic(kinematic), .streamed_masses(streamed_masses),
+    .there(there), .head({head[3], head[2], head[1], head[0]}), .loads(loads), .finished(load_finished),
+    .write(load_write), .write_address_a(load_address_a), .write_address_b(load_address_b),
+    .velocity_a(load_velocity_a), .velocity_b(load_velocity_b), .error(load_error), .error_body(load_error_body),
+    .found_a(next_a), .found_b(next_b), .entering(entering),
+    .properties_a(properties_a), .moves_a(has_mass_a), .properties_b(properties_b), .moves_b(has_mass_b)
   );
 
   // ---- Collisions: found, issued, registered
@@ -193,22 +185,21 @@ module core (
   wire [COLLISION:0] last_use_a, last_use_b;
   wire [BODY-1:0]    found_a, found_b;
   wire               found_moves_a, found_moves_b;
-  wire [63:0]        found_mass_a, found_mass_b;
+  wire [PROPERTIES-1:0] found_mass_a, found_mass_b;
   wire [2:0]         found_points;
   wire               find_error;
   wire [7:0]         find_error_code;
   wire [19:0]        find_error_collision;
-  finder #(.BODIES(BODIES), .BODY(BODY), .COLLISION(COLLISION)) find (
+  finder #(.BODIES(BODIES), .BODY(BODY), .COLLISION(COLLISION), .PROPERTIES(PROPERTIES)) find (
     .clk(clk), .clear(clear), .run(finding), .phase(phase), .bodies(bodies), .collisions(collisions),
     .pair_friction(pair_friction),
     .count_comes(collision_begins[0]), .count_word(s_tdata[127:96]),
     .body_a_comes(collision_begins[1]), .body_a_word(s_tdata[255:224]),
     .body_b_comes(collision_begins[2]), .body_b_word(s_tdata[383:352]),
-    .load_a(load_write[0]), .load_address_a(load_address[0]),
-    .load_b(load_write[1]), .load_address_b(load_address[1]),
-    .shape_address_a(shape_of_a), .shape_address_b(shape_of_b),
-    .properties_a(properties[0]), .properties_b(properties[1]),
-    .shape_moves_a(shape_moves[0]), .shape_moves_b(shape_moves[1]),
+    .load_a(load_write[0]), .load_address_a(load_address_a),
+    .load_b(load_write[1]), .load_address_b(load_address_b),
+    .next_body_a(next_a), .next_body_b(next_b),
+    .properties_a(properties_a), .properties_b(properties_b), .has_mass_a(has_mass_a), .has_mass_b(has_mass_b),
     .pop(issues), .found(found), .last_use_a(last_use_a), .last_use_b(last_use_b),
     .body_a(found_a), .body_b(found_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
     .mass_a(found_mass_a), .mass_b(found_mass_b), .points(found_points),
@@ -242,7 +233,7 @@ module core (
   reg             valid;
   reg  [BODY-1:0] early_a, early_b, body_a, body_b;
   reg             early_moves_a, early_moves_b, moves_a, moves_b;
-  reg  [63:0]     early_mass_a, early_mass_b, mass_a, mass_b;
+  reg  [PROPERTIES-1:0] early_mass_a, early_mass_b, mass_a, mass_b;
   reg  [2:0]      early_points, points;
   reg  [31:0]     friction_of;         // coefficient of the collision
   wire [31:0]     own_friction;
@@ -327,13 +318,13 @@ module core (
   ) velocities (
     .clk(clk),
     .write_a(in_pass ? write_a : load_write[0]),
-    .address_a(integrating ? entering : ~in_pass ? load_address[0]
+    .address_a(integrating ? entering : ~in_pass ? load_address_a
                : phase ? write_address_a : friction ? friction_read_a : contact_read_a),
-    .in_a(in_pass ? write_velocity_a : load_velocity[0]), .out_a(velocity_a),
+    .in_a(in_pass ? write_velocity_a : load_velocity_a), .out_a(velocity_a),
     .write_b(in_pass ? write_b : load_write[1]),
-    .address_b(~in_pass ? load_address[1]
+    .address_b(~in_pass ? load_address_b
                : phase ? write_address_b : friction ? friction_read_b : contact_read_b),
-    .in_b(in_pass ? write_velocity_b : load_velocity[1]), .out_b(velocity_b)
+    .in_b(in_pass ? write_velocity_b : load_velocity_b), .out_b(velocity_b)
   );
 
   // ---- Impulses
@@ -363,8 +354,8 @@ module core (
   contact contact_pipeline (
     .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
-    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
-    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
+    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[PROPERTIES-1:32]),
+    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[PROPERTIES-1:32]),
     .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
     .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
     .per_second(per_second), .drift(drift), .coefficient(coefficient),
@@ -381,8 +372,8 @@ module core (
   friction friction_pipeline (
     .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
     .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
-    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[63:32]),
-    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[63:32]),
+    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[PROPERTIES-1:32]),
+    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[PROPERTIES-1:32]),
     .per_count(per_count), .one_static(one_static), .used0(used[0]),
     .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
     .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
@@ -406,7 +397,7 @@ module core (
     .even_there(there[0] & there[1]), .even_pose({head[1], head[0]}),
     .odd_there(there[2] & there[3]), .odd_pose({head[3], head[2]}),
     .pop_even(pop_even), .pop_odd(pop_odd), .enters(enters), .finished(enter_finished),
-    .address(entering), .shape_moves(shape_moves[0]),
+    .address(entering), .has_mass(has_mass_a),
     .valid(body_valid), .pose(body_pose), .free(body_free), .body_damping(body_damping)
   );
 
@@ -469,11 +460,11 @@ module core (
         error_code    <= wrong[0] ? wrong_code[0] : wrong[1] ? wrong_code[1] : wrong[2] ? wrong_code[2] : wrong_code[3];
         error_channel <= wrong[0] ? 8'd0 : wrong[1] ? 8'd1 : wrong[2] ? 8'd2 : 8'd3;
         error_detail  <= {11'd0, wrong[0] ? wrong_beat[0] : wrong[1] ? wrong_beat[1] : wrong[2] ? wrong_beat[2] : wrong_beat[3]};
-      end else if (|load_error) begin
+      end else if (load_error) begin
         error         <= 1'b1;
         error_code    <= ERROR_SHAPE_INDEX;
         error_channel <= 8'd0;
-        error_detail  <= {12'd0, load_error[0] ? load_error_body[0] : load_error_body[1]};
+        error_detail  <= {12'd0, load_error_body};
       end else if (find_error) begin
         error         <= 1'b1;
         error_code    <= find_error_code;

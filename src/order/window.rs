@@ -1,6 +1,6 @@
 //! The distance that the uses of a body must have, counted in issue slots.
 
-use pgs_interface::profile::{Flow, Profile};
+use pgs_interface::profile::{Depth, Flow, Profile, Variant};
 
 use super::OrderError;
 use crate::control_block::Capabilities;
@@ -49,23 +49,31 @@ impl IssueWindow {
         let Capabilities { variant, contact, friction, .. } = capabilities;
         // The values that the bitstream reports replace the values of its profile.
         let reported = Profile {
-            contact: *contact,
-            friction: *friction,
             initiation_interval: capabilities.initiation_interval,
             collisions_per_issue: capabilities.collisions_per_issue,
             flow: capabilities.window.map_or(Flow::Passes, Flow::Window),
             ..*variant.profile
         };
-        Self::of_profile(&reported, parameters)
+        Self::of_depths(&reported, [*contact, *friction], parameters)
     }
 
     /// The window of a step on a design with the values of its profile; errors as
     /// [`new`](Self::new).
-    pub(crate) fn of_profile(
-        profile: &Profile,
+    pub(crate) fn of_variant(
+        variant: &Variant,
         parameters: &StepParameters,
     ) -> Result<Self, OrderError> {
-        let cycles = profile.contact.window.max(profile.friction.window);
+        let depths = [variant.contact(), variant.friction()];
+        Self::of_depths(variant.profile, depths, parameters)
+    }
+
+    fn of_depths(
+        profile: &Profile,
+        depths: [Depth; 2],
+        parameters: &StepParameters,
+    ) -> Result<Self, OrderError> {
+        let [contact, friction] = depths.map(|depth| depth.window);
+        let cycles = contact.max(friction);
         let (slot, per_issue) = match profile.flow {
             Flow::Passes => (profile.initiation_interval, profile.collisions_per_issue),
             Flow::Window(window) => {
@@ -119,8 +127,9 @@ mod tests {
     /// cycles.
     #[test]
     fn the_window_of_a_profile_is_that_of_its_deeper_pipeline() {
-        let of = |profile: &Profile, parameters: &StepParameters| {
-            let window = IssueWindow::of_profile(profile, parameters).expect("a window");
+        let of = |profile: &'static Profile, parameters: &StepParameters| {
+            let variant = profile.default_variant();
+            let window = IssueWindow::of_variant(&variant, parameters).expect("a window");
             (window.depth(), window.per_issue())
         };
         let bullet = StepParameters::default();

@@ -235,7 +235,7 @@ fn too_long(
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let excess = Excess::OrderTooLong { collisions, bodies, limit, depth, body, uses };
     needs.refuse(excess, |variant| {
-        let Ok(window) = IssueWindow::of_profile(variant.profile, parameters) else { return false };
+        let Ok(window) = IssueWindow::of_variant(variant, parameters) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
         match variant.profile.flow {

@@ -2,7 +2,8 @@
 # Reads the generated Verilog with Icarus as plain Verilog-2001, with Verilator and all its checks, and with
 # Yosys. A warning fails it.
 #
-# usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked
+# usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked; without any, the
+#                                    default build and the one with world inertia
 #
 # Verilator's complaints about constants of the headers that a module does not use are switched off
 # there; no other warning is.
@@ -16,9 +17,6 @@ need_packages iverilog verilator yosys
 mkdir -p "$target_root"
 work=$(mktemp -d "$target_root/rtl-lint.XXXXXX")
 litter+=("$work")
-attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" "$@"
-cd "$work"
-files=$(tr '\n' ' ' < pgs.f)
 
 # Runs a tool, which has nothing to say unless it has a warning.
 failed=
@@ -34,7 +32,18 @@ quietly() {
 		echo "$tool: no warning"
 	fi
 }
-quietly iverilog iverilog -g2001 -Wall -s pgs_top -o /dev/null -f pgs.f
-quietly verilator verilator --lint-only -Wall --top-module pgs_top -f pgs.f
-quietly yosys yosys -q -p "read_verilog $files; hierarchy -check -top pgs_top"
+
+# Reads the build with these options.
+read_build() {
+	local files
+	cd "$repository"
+	attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" "$@"
+	cd "$work"
+	files=$(tr '\n' ' ' < pgs.f)
+	quietly iverilog iverilog -g2001 -Wall -s pgs_top -o /dev/null -f pgs.f
+	quietly verilator verilator --lint-only -Wall --top-module pgs_top -f pgs.f
+	quietly yosys yosys -q -p "read_verilog $files; hierarchy -check -top pgs_top"
+}
+read_build "$@"
+if [ $# = 0 ]; then read_build --inertia world; fi
 [ -z "$failed" ] || fail "the Verilog has warnings"

@@ -5,7 +5,8 @@
 # usage: tools/scripts/rtl-test.sh             a few minutes
 #        tools/scripts/rtl-test.sh steps       instead, the driver's whole steps through registers and DMA:
 #                                              all recorded ones, and faults; then 500 random steps against
-#                                              the model, and 500 among register accesses in lock step
+#                                              the model, and 500 among register accesses in lock step, with
+#                                              either form of inertia
 #        tools/scripts/rtl-test.sh mutations   instead, seeded mistakes in the Verilog: each must be found
 #        tools/scripts/rtl-test.sh --help
 #
@@ -41,24 +42,33 @@ if [ "$mode" = '' ]; then
 	attend "$built/rtlgen" operators --vectors "${VECTORS:-1000000}"
 	attend "$built/rtlgen" sincos --all
 	attend "$built/rtlgen" schedule
+	attend "$built/rtlgen" schedule --inertia world
 fi
 
-# Both hazard modes are built side by side.
+# Both hazard modes, and world inertia, are built side by side.
+simulations=()
 begin "$built/rtlgen" simulator --out "$folder/interlocked"
-interlocked=$!
+simulations+=($!)
 begin "$built/rtlgen" simulator --out "$folder/unchecked" --hazards unchecked
-unchecked=$!
-await "$interlocked"
-await "$unchecked"
+simulations+=($!)
+begin "$built/rtlgen" simulator --out "$folder/world" --inertia world
+simulations+=($!)
+for process in "${simulations[@]}"; do await "$process"; done
+world=$folder/world/pgs-rtl
 
 recorded=(tests/golden/*/)
 simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
 if [ "$mode" = steps ]; then
 	if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile*/); fi
 	attend "$built/pgs" check --board emulated --subnormals flush --accelerator "rtl:${simulators[0]}"
+	attend "$built/pgs" check --board emulated --subnormals flush --inertia world --accelerator "rtl:$world"
 	attend "$built/pgs" faults --accelerator "rtl:${simulators[0]}"
-	attend "$built/cosim" random --simulator "${simulators[0]}" --cases 500 --seed 5000000
-	attend "$built/cosim" registers --simulator "${simulators[0]}" --cases 500
+	for build in interlocked world; do
+		cosim=(--simulator "$folder/$build/pgs-rtl")
+		if [ "$build" = world ]; then cosim+=(--inertia world); fi
+		attend "$built/cosim" random "${cosim[@]}" --cases 500 --seed 5000000
+		attend "$built/cosim" registers "${cosim[@]}" --cases 500
+	done
 	# The longest part comes last.
 	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
 	exit
@@ -71,6 +81,8 @@ for hazards in interlocked unchecked; do
 	begin "$built/cosim" random --simulator "$folder/$hazards/pgs-rtl" --hazards "$hazards" --cases "$cases"
 	random+=($!)
 done
+begin "$built/cosim" random --simulator "$world" --inertia world --cases $((cases / 2))
+random+=($!)
 for process in "${random[@]}"; do await "$process"; done
 for hazards in interlocked unchecked; do
 	cosim=(--simulator "$folder/$hazards/pgs-rtl" --hazards "$hazards")
@@ -79,6 +91,12 @@ for hazards in interlocked unchecked; do
 	attend "$built/cosim" full "${cosim[@]}"
 	attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
 done
+cosim=(--simulator "$world" --inertia world)
+attend "$built/cosim" recorded "${cosim[@]}" "${recorded[@]}"
+attend "$built/cosim" errors "${cosim[@]}"
+attend "$built/cosim" full "${cosim[@]}"
+attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
+attend "$built/cosim" random "${cosim[@]}" --cases $((cases / 10)) --seed 1000000 --gaps 300 --stalls 700
 # Without the interlock the bits depend on the time at which beats come.
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
 	--gaps 300 --stalls 700
@@ -88,3 +106,6 @@ attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated --su
 # Impulses of each step come out, and go into the next one.
 attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated --subnormals flush \
 	--accelerator "both:${simulators[0]}"
+# Boxes, capsules and 125 masses, which the bodies bring.
+attend "$built/pgs" run --scene shapes --grid 5x5x5 --drop 0 --steps 20 --board emulated --subnormals flush \
+	--accelerator "both:$world"

@@ -10,7 +10,8 @@
 module finder #(
   parameter BODIES    = 40960,
   parameter BODY      = 16,
-  parameter COLLISION = 17
+  parameter COLLISION = 17,
+  parameter PROPERTIES = 64                  // bits of a body's mass and inertia
 ) (
   input  wire                 clk,
   input  wire                 clear,
@@ -34,13 +35,13 @@ module finder #(
   input  wire                 load_b,
   input  wire [BODY-1:0]      load_address_b,
 
-  // Shapes of the bodies: properties 3 cycles after the address.
-  output wire [BODY-1:0]      shape_address_a,
-  output wire [BODY-1:0]      shape_address_b,
-  input  wire [63:0]          properties_a,
-  input  wire [63:0]          properties_b,
-  input  wire                 shape_moves_a,
-  input  wire                 shape_moves_b,
+  // Properties of the bodies, 3 cycles after their numbers.
+  output wire [BODY-1:0]      next_body_a,
+  output wire [BODY-1:0]      next_body_b,
+  input  wire [PROPERTIES-1:0] properties_a,
+  input  wire [PROPERTIES-1:0] properties_b,
+  input  wire                 has_mass_a,
+  input  wire                 has_mass_b,
 
   // The collision that is issued next.
   input  wire                 pop,
@@ -51,8 +52,8 @@ module finder #(
   output wire [BODY-1:0]      body_b,
   output wire                 moves_a,       // hazards and write-backs; 0 for padding
   output wire                 moves_b,
-  output wire [63:0]          mass_a,
-  output wire [63:0]          mass_b,
+  output wire [PROPERTIES-1:0] mass_a,
+  output wire [PROPERTIES-1:0] mass_b,
   output wire [2:0]           points,        // 0 for padding
 
   output reg                  error,
@@ -142,8 +143,8 @@ module finder #(
       <= {a_s2, b_s2, number_s2, count_s2, beyond_s2, same_s2};
   end
 
-  assign shape_address_a = next_a[BODY-1:0];
-  assign shape_address_b = next_b[BODY-1:0];
+  assign next_body_a = next_a[BODY-1:0];
+  assign next_body_b = next_b[BODY-1:0];
 
   localparam [COLLISION:0] NEVER = {1'b1, {COLLISION{1'b0}}};
   wire                 uses = valid_s1 & (count_s1 != 3'd0);
@@ -166,10 +167,10 @@ module finder #(
   end
 
   wire padding    = count_s3 == 3'd0;
-  wire moves_a_s3 = shape_moves_a & ~padding;
-  wire moves_b_s3 = shape_moves_b & ~padding;
+  wire moves_a_s3 = has_mass_a & ~padding;
+  wire moves_b_s3 = has_mass_b & ~padding;
 
-  localparam WIDTH = 2 * (COLLISION + 1) + 2 * BODY + 2 + 128 + 3;
+  localparam WIDTH = 2 * (COLLISION + 1) + 2 * BODY + 2 + 2 * PROPERTIES + 3;
   fifo #(.WIDTH(WIDTH), .ADDRESS(5), .LIMIT(24)) found_collisions (
     .clk(clk), .clear(clear), .push(valid_s3),
     .in({use_a_s3, use_b_s3, a_s3, b_s3, moves_a_s3, moves_b_s3, properties_a, properties_b, count_s3}),

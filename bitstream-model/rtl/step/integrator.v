@@ -1,10 +1,10 @@
 // Lets the bodies into the integration, one a cycle: even ones with the pose on streams 0 and 1, odd
-// ones with the pose on streams 2 and 3. The velocity and the shape of a body are read on the way.
+// ones with the pose on streams 2 and 3. The velocity and the mass of a body are read on the way.
 `default_nettype none
 
 module integrator #(
   parameter BODY         = 16,
-  parameter READ_LATENCY = 6           // of the velocities; the shapes take 3 cycles
+  parameter READ_LATENCY = 6           // of the velocities; the masses take 3 cycles
 ) (
   input  wire            clk,
   input  wire            start,
@@ -23,8 +23,8 @@ module integrator #(
 
   output wire            enters,
   output reg             finished,     // all bodies have entered
-  output reg  [BODY-1:0] address,      // of velocity and shape
-  input  wire            shape_moves,  // 3 cycles after the address
+  output reg  [BODY-1:0] address,      // of velocity and mass
+  input  wire            has_mass,     // 3 cycles after the address
 
   // Cycle 0 of the pipeline.
   output wire            valid,
@@ -32,7 +32,7 @@ module integrator #(
   output wire            free,         // the body has a mass, and is integrated
   output wire [31:0]     body_damping  // of its spin: 1 without a mass
 );
-  localparam SHAPE_LATENCY = 3;
+  localparam MASS_LATENCY = 3;
   localparam [31:0] ONE = 32'h3f800000;
 
   reg [19:0] body, left;
@@ -62,12 +62,12 @@ module integrator #(
   reg        free_now;
   reg [31:0] damping_now;
   always @(posedge clk) begin
-    free_now    <= shape_moves & integrate;
-    damping_now <= shape_moves ? damping : ONE;
+    free_now    <= has_mass & integrate;
+    damping_now <= has_mass ? damping : ONE;
   end
   timed_flag #(.STAGES(READ_LATENCY)) valid_late (.clk(clk), .clear(start), .d(valid_s1), .q(valid));
   pipeline_register #(.WIDTH(256), .STAGES(READ_LATENCY)) pose_late (.clk(clk), .d(pose_s1), .q(pose));
-  pipeline_register #(.WIDTH(33), .STAGES(READ_LATENCY - SHAPE_LATENCY - 1)) free_late (
+  pipeline_register #(.WIDTH(33), .STAGES(READ_LATENCY - MASS_LATENCY - 1)) free_late (
     .clk(clk), .d({free_now, damping_now}), .q({free, body_damping})
   );
 endmodule

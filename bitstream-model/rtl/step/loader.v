@@ -1,33 +1,31 @@
-// Load: the velocities and the shapes of all bodies go from the streams into the memories, a pair of
-// bodies a cycle: the even one from streams 0 and 1 through port A, the odd one from streams 2 and 3
-// through port B. Both enter together: a load takes one cycle a pair.
+// Load: the velocities of the bodies FIRST, FIRST + STRIDE and so on go from the streams to the memories, one
+// a cycle. Whether a body has a mass is found on the way.
 //
-// A body of inverse mass 0 is at rest because of its shape: its stored velocity is 0, unless such bodies may
+// A body of inverse mass 0 is at rest whatever its words are: its stored velocity is 0, unless such bodies may
 // move in this step.
 `default_nettype none
 
 module loader #(
   parameter BODY      = 16,      // bits of a body's number
   parameter SHAPE     = 6,       // bits of a shape's number
-  parameter ODD       = 0        // 1: this is the loader of the odd bodies
+  parameter FIRST     = 0,
+  parameter STRIDE    = 2        // loaders side by side: 1 or 2
 ) (
   input  wire            clk,
   input  wire            start,
-  input  wire            run,
+  input  wire            run,             // the load is under way, and the loader beside this one is ready
   input  wire [19:0]     bodies,
   input  wire            kinematic,       // bodies of inverse mass 0 may move
 
-  input  wire            linear_there,    // the oldest beats of both streams
+  input  wire            there,           // the oldest beats of a record
   input  wire [127:0]    linear,
-  input  wire            angular_there,
   input  wire [127:0]    angular,
-  output wire            ready,           // the body is there, or this side has no more
-  input  wire            other_ready,
+  input  wire            names_shape,     // the mass is that of a shape
   output wire            pop,
   output reg             finished,        // all bodies have been taken
 
   output reg  [SHAPE-1:0] lookup,         // shape whose properties are needed in the next cycle
-  input  wire            lookup_moves,
+  input  wire            lookup_moves,    // the body has a mass
 
   output reg             write,
   output reg  [BODY-1:0] address,
@@ -48,20 +46,19 @@ module loader #(
   reg  [19:0] left, share;
   reg         no_share;
 
-  assign ready    = finished | (linear_there & angular_there);
-  assign pop      = run & ~finished & ready & other_ready;
+  assign pop      = run & ~finished & there;
   wire unused = &{1'b0, angular[127:96]};
   assign velocity = (lookup_moves | kinematic) ? velocity_s2 : 192'd0;
 
   always @(posedge clk) begin
-    share    <= (bodies + ((ODD == 0) ? 20'd1 : 20'd0)) >> 1;
+    share    <= (STRIDE == 1) ? bodies : (bodies + ((FIRST == 0) ? 20'd1 : 20'd0)) >> 1;
     no_share <= share == 20'd0;
     if (start) begin
-      body     <= (ODD == 0) ? 20'd0 : 20'd1;
+      body     <= FIRST[19:0];
       left     <= share;
       finished <= no_share;
     end else if (pop) begin
-      body     <= body + 20'd2;
+      body     <= body + STRIDE[19:0];
       left     <= left - 20'd1;
       finished <= left == 20'd1;
     end
@@ -72,7 +69,7 @@ module loader #(
     shape_s1    <= linear[103:96];
     velocity_s1 <= {angular[95:0], linear[95:0]};
     beyond_s1   <= |linear[127:96+SHAPE];
-    error       <= write_s1 & beyond_s1;
+    error       <= write_s1 & beyond_s1 & names_shape;
     error_body  <= {{(20-BODY){1'b0}}, body_s1};
 
     write       <= write_s1;

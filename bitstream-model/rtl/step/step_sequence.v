@@ -2,7 +2,7 @@
 // the cycles of work and the cycles of waiting.
 //
 //             cycles                         ends when
-//   load      ceil(B / 2)                    all bodies are taken
+//   load      ceil(B / 2)                    all bodies are taken; with world inertia B cycles
 //   setup     SETUP                          the finder has found the first collision
 //   pass      2 C - 1                        the last collision is issued
 //   drain     fill + 1                       its write-back can be read
@@ -28,7 +28,7 @@ module step_sequence #(
   input  wire        warm_start,        // the first pass of each kind is a warm one
   input  wire        impulses_out,      // the last pass of each kind sends the impulses
 
-  input  wire        loads,             // a pair of bodies is taken
+  input  wire        loads,             // a body or a pair of them is taken
   input  wire        load_finished,
   input  wire        issues,
   input  wire        stalls,

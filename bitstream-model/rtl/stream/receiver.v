@@ -2,8 +2,8 @@
 // and keeps the beats in a FIFO until a record takes them.
 //
 // A step has a packet of velocities, one of collisions in every pass, and one of poses. Beats of a
-// body are dealt to the four streams in turn, two a body; of the seven beats of a collision streams
-// 0, 1 and 2 carry two and stream 3 one, and in a warm pass stream 3 carries a second one, its impulses
+// body are dealt to the four streams in turn: two a body, but for a velocity with world inertia, which has
+// four. Of the seven beats of a collision streams 0, 1 and 2 carry two and stream 3 one, and in a warm pass stream 3 carries a second one, its impulses
 // (specification, sections 2 and 3). A packet without a beat does not exist.
 //
 // All lengths are registered before `start`, and the end of a packet is a flag that a down-counter
@@ -11,7 +11,8 @@
 `default_nettype none
 
 module receiver #(
-  parameter CHANNEL = 0
+  parameter CHANNEL       = 0,
+  parameter WORLD_INERTIA = 0
 ) (
   input  wire         clk,
   input  wire         stop,             // reset, or the step has an error: no more beats are taken
@@ -51,11 +52,12 @@ module receiver #(
   // Beats of a packet on this stream.
   localparam [20:0] BODY_OFFSET = 21'd3 - CHANNEL;
   reg [20:0] body_beats, pass_beats;
-  reg        body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
+  reg        one_body, body_beats_none, body_beats_one, pass_beats_one, passes_none, passes_one;
   reg [9:0]  before_friction;    // passes left when the last contact pass is under way
   wire [20:0] body_beats_next = ({bodies, 1'b0} + BODY_OFFSET) >> 2;
   wire [20:0] pass_beats_next = (CHANNEL == 3) ? {1'b0, collisions} : {collisions, 1'b0};
   always @(posedge clk) begin
+    one_body        <= bodies == 20'd1;
     body_beats      <= body_beats_next;
     pass_beats      <= pass_beats_next;
     body_beats_none <= body_beats_next == 21'd0;
@@ -87,7 +89,7 @@ module receiver #(
   wire [1:0] next_segment  = (segment == VELOCITIES) ? after_load
                            : (in_pass & ~pass_is_last) ? PASSES
                            : in_pass ? after_passes : FINISHED;
-  wire [1:0] first_segment = body_beats_none ? after_load : VELOCITIES;
+  wire [1:0] first_segment = ((WORLD_INERTIA == 0) & body_beats_none) ? after_load : VELOCITIES;
   wire       next_is_warm  = warm_start & (~in_pass | (passes_left == before_friction));
 
   task begin_packet(input [1:0] of, input warm);
@@ -96,8 +98,12 @@ module receiver #(
       open         <= of != FINISHED;
       beat         <= 21'd0;
       second       <= 1'b0;
-      left         <= (of != PASSES) ? body_beats : ((CHANNEL == 3) & warm) ? {collisions, 1'b0} : pass_beats;
-      beat_is_last <= (of != PASSES) ? body_beats_one : pass_beats_one & ~((CHANNEL == 3) & warm);
+      left         <= ((WORLD_INERTIA != 0) & (of == VELOCITIES)) ? {1'b0, bodies}
+                    : (of != PASSES) ? body_beats
+                    : ((CHANNEL == 3) & warm) ? {collisions, 1'b0} : pass_beats;
+      beat_is_last <= ((WORLD_INERTIA != 0) & (of == VELOCITIES)) ? one_body
+                    : (of != PASSES) ? body_beats_one
+                    : pass_beats_one & ~((CHANNEL == 3) & warm);
     end
   endtask
 

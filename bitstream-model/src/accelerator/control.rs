@@ -349,8 +349,8 @@ impl Registers {
                 issue::INTERVAL.put(0, profile.initiation_interval),
                 profile.collisions_per_issue,
             ),
-            _ if offset == CONTACT_DEPTH.offset => pipeline(profile.contact),
-            _ if offset == FRICTION_DEPTH.offset => pipeline(profile.friction),
+            _ if offset == CONTACT_DEPTH.offset => pipeline(variant.contact()),
+            _ if offset == FRICTION_DEPTH.offset => pipeline(variant.friction()),
             _ if offset == CLOCK_KHZ.offset => profile.clock_khz,
             _ if offset == BODY_CAPACITY.offset => variant.body_capacity(),
             _ if offset == COLLISION_CAPACITY.offset => memory

@@ -148,9 +148,11 @@ impl Accelerator {
 
     /// Depth of the pipeline that a pass goes through.
     pub(crate) fn depth(&self, pass: u32) -> Depth {
-        let profile = self.variant.profile;
         let contact = pass < self.arguments.contact_passes();
-        self.config.depth(if contact { profile.contact } else { profile.friction })
+        self.config.depth(match contact {
+            true => self.variant.contact(),
+            false => self.variant.friction(),
+        })
     }
 
     fn start_pass(&mut self, number: u32, deferral: Deferral<'_>) {

@@ -268,12 +268,12 @@ impl BoardConfig {
     }
 
     /// Depth of one kind of pass on this board: a pass ends no sooner than its last write-back.
-    pub(crate) fn depth(&self, profile: Depth) -> Depth {
+    pub(crate) fn depth(&self, design: Depth) -> Depth {
         let window = match self.window_slots {
             Some(slots) => slots.saturating_mul(self.profile.initiation_interval),
-            None => profile.window,
+            None => design.window,
         };
-        Depth { fill: profile.fill.max(window), window }
+        Depth { fill: design.fill.max(window), window }
     }
 
     /// Clock cycles in `ns` nanoseconds.

@@ -90,8 +90,8 @@ impl StepCycles {
         let fill = if step.passes() == 0 {
             0
         } else {
-            let contact = step.contact_iterations.saturating_mul(profile.contact.fill.into());
-            let friction = step.friction_iterations.saturating_mul(profile.friction.fill.into());
+            let contact = step.contact_iterations.saturating_mul(variant.contact().fill.into());
+            let friction = step.friction_iterations.saturating_mul(variant.friction().fill.into());
             contact.saturating_add(friction)
         };
         let (load, pose_in, result_out) =

@@ -47,8 +47,8 @@ impl WarmCost {
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let kinds = [
-            (step.contact_iterations, profile.contact),
-            (step.friction_iterations, profile.friction),
+            (step.contact_iterations, variant.contact()),
+            (step.friction_iterations, variant.friction()),
         ];
         let kinds = kinds.into_iter().filter(|(count, _)| *count > 0 && step.collisions > 0);
         let issues = step.collisions.div_ceil(u64::from(profile.collisions_per_issue).max(1));

@@ -93,7 +93,8 @@ impl WindowCycles {
         let entries = if passes == 0 { 0 } else { shape.collisions };
         let stream = entries.saturating_mul(slot);
         let behind = passes.saturating_sub(1).saturating_mul(step.lag).saturating_mul(slot);
-        let last = if shape.friction_iterations > 0 { profile.friction } else { profile.contact };
+        let last =
+            if shape.friction_iterations > 0 { variant.friction() } else { variant.contact() };
         let fill = if passes == 0 { 0 } else { last.fill.into() };
         let solver = stream.saturating_add(behind).saturating_add(fill);
         let side = |bodies| {

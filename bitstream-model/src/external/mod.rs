@@ -91,6 +91,14 @@ pub enum ExternalError {
         /// The board's.
         board: &'static str,
     },
+    /// It was built for another form of inertia.
+    #[error("the simulator is built for {simulator} inertia, and the board for {board} inertia")]
+    Inertia {
+        /// The simulator's form.
+        simulator: &'static str,
+        /// The board's.
+        board: &'static str,
+    },
     /// It has ended, or its pipes are closed.
     #[error("the simulator has ended in the middle of a request ({act})")]
     Ended {

@@ -30,7 +30,7 @@ use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards, Subnormals};
 use pgs_interface::control::{FEATURES, IDENTIFICATION, IDENTIFICATION_VALUE, features};
 use pgs_interface::extension::Extensions;
-use pgs_interface::profile::FLOAT;
+use pgs_interface::profile::{FLOAT, Inertia};
 use pgs_interface::record::Beat;
 
 pub(super) const STREAMS: usize = 4;
@@ -76,8 +76,9 @@ impl SimulatorProcess {
     /// treats subnormal numbers as the simulator does, and has no extension that the simulator lacks.
     ///
     /// # Errors
-    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] for
-    /// a simulator that treats hazards in another way; else as for [`start`](Self::start).
+    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] and
+    /// [`ExternalError::Inertia`] for a simulator that treats hazards in another way or was built for another
+    /// form of inertia; else as for [`start`](Self::start).
     pub fn start_for(config: &mut BoardConfig, path: &Path) -> Result<Self, ExternalError> {
         if config.profile != &FLOAT {
             let (generated, asked) = (FLOAT.name, config.profile.name);
@@ -90,6 +91,11 @@ impl SimulatorProcess {
             let name = |interlocked| if interlocked { "interlocked" } else { "unchecked" };
             let (simulator, board) = (name(interlocked), name(!interlocked));
             return Err(ExternalError::Hazards { simulator, board });
+        }
+        let world = features::WORLD_INERTIA.is_set(features);
+        if world != (config.inertia == Inertia::World) {
+            let name = |world| if world { "world" } else { "isotropic" };
+            return Err(ExternalError::Inertia { simulator: name(world), board: name(!world) });
         }
         config.subnormals = match features::FLUSH_SUBNORMALS.is_set(features) {
             true => Subnormals::Flush,

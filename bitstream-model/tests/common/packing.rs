@@ -208,7 +208,7 @@ impl Step {
         let collisions = self.collisions.len() as u64;
         let issues = collisions.div_ceil(profile.collisions_per_issue.into());
         let pass = issues * u64::from(profile.initiation_interval);
-        let depths = [profile.contact, profile.friction];
+        let depths = [variant.contact(), variant.friction()];
         let passes: u64 = self
             .iterations
             .into_iter()

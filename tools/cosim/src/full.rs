@@ -4,6 +4,7 @@
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError};
 use pgs_interface::control::{AP_CTRL, ap_ctrl};
+use pgs_interface::profile::Inertia;
 
 use crate::outcome::{self, Arrival, Feed, Outcome, difference};
 use crate::packets::{Beats, packets};
@@ -18,12 +19,13 @@ const BODIES: usize = 500;
 const HELD_CLOCKS: u64 = 50_000;
 
 /// The step of a seed, with its bodies and collisions over and over; always another pair of bodies.
-fn scene(seed: u64, warm_start: bool) -> Scene {
-    let mut scene = random::case(seed).scene;
+fn scene(seed: u64, inertia: Inertia, warm_start: bool) -> Scene {
+    let mut scene = random::case(seed, inertia).scene;
     scene.bodies = scene.bodies.iter().cycle().take(BODIES).copied().collect();
     scene.collisions = scene.collisions.iter().cycle().take(COLLISIONS).copied().collect();
     for body in scene.bodies.iter_mut().step_by(2) {
         body.shape = 0;
+        body.inverse_mass = 1.0_f32.to_bits();
     }
     for (collision, a) in scene.collisions.iter_mut().zip((0..).step_by(2)) {
         let a = a % u32::try_from(BODIES).unwrap_or(2);
@@ -59,11 +61,12 @@ fn run(
 /// # Errors
 /// An accelerator does not answer.
 pub fn first_difference(
+    inertia: Inertia,
     model: &mut dyn ExternalAccelerator,
     rtl: &mut dyn ExternalAccelerator,
 ) -> Result<Option<String>, ExternalError> {
     for (seed, warm_start) in [(2, true), (4, false)] {
-        let scene = scene(seed, warm_start);
+        let scene = scene(seed, inertia, warm_start);
         let beats = packets(&scene, None);
         let model = run(model, &scene, &beats)?;
         let rtl = run(rtl, &scene, &beats)?;

@@ -14,12 +14,13 @@ use bitstream_model::{BoardConfig, Hazards, Subnormals};
 use clap::{Parser, Subcommand, ValueEnum};
 use cosim::accesses;
 use cosim::flaws::{Flawed, Flaws};
-use cosim::mutation::MUTATIONS;
+use cosim::mutation::{MUTATIONS, Mutation};
 use cosim::outcome::{self, Arrival, Outcome, difference};
 use cosim::packets::packets;
 use cosim::refusal::{Refusal, refusals};
 use cosim::{full, random, recorded};
 use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, error};
+use pgs_interface::profile::Inertia;
 use pgs_interface::register::Register;
 use rtlgen::design::{Design, Parameters};
 use rtlgen::emit::{self, File};
@@ -41,6 +42,7 @@ Examples:
   cosim recorded --simulator target/rtl/pgs-rtl tests/golden/*/
   cosim random --simulator target/rtl/pgs-rtl --cases 1000
   cosim random --simulator target/rtl/pgs-rtl --gaps 300 --stalls 700
+  cosim random --simulator target/rtl-world/pgs-rtl --inertia world
   cosim errors --simulator target/rtl/pgs-rtl
   cosim full --simulator target/rtl/pgs-rtl
   cosim registers --simulator target/rtl/pgs-rtl --cases 500
@@ -58,15 +60,57 @@ enum HazardMode {
     Unchecked,
 }
 
+/// The form of the bodies' inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum InertiaForm {
+    /// Equal about every axis, by the shape.
+    Isotropic,
+    /// Any, streamed with every body, with its mass.
+    World,
+}
+
+impl From<InertiaForm> for Inertia {
+    fn from(form: InertiaForm) -> Self {
+        match form {
+            InertiaForm::Isotropic => Self::Isotropic,
+            InertiaForm::World => Self::World,
+        }
+    }
+}
+
+/// The build of the hardware.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct BuildArgs {
+    /// The treatment of hazards for which it was built
+    #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
+    hazards: HazardMode,
+    /// The inertia for which it was built
+    #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
+    inertia: InertiaForm,
+}
+
+impl BuildArgs {
+    /// The configuration of a model that equals the generated hardware.
+    fn config(self) -> BoardConfig {
+        let hazards = match self.hazards {
+            HazardMode::Interlocked => Hazards::Interlocked,
+            HazardMode::Unchecked => Hazards::Unchecked,
+        };
+        let inertia = self.inertia.into();
+        let subnormals = Subnormals::Flush;
+        let extensions = Parameters::with(inertia).extensions();
+        BoardConfig { hazards, inertia, subnormals, extensions, ..Default::default() }
+    }
+}
+
 /// A simulator and how its streams behave.
 #[derive(Debug, Clone, clap::Args)]
 struct SimulatorArgs {
     /// The simulator that `rtlgen simulator` built
     #[arg(long, value_name = "PATH")]
     simulator: PathBuf,
-    /// The mode for which it was built
-    #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
-    hazards: HazardMode,
+    #[command(flatten)]
+    build: BuildArgs,
     /// Cycles in a thousand in which a stream into the accelerator has no beat
     #[arg(long, value_name = "N", default_value_t = 0)]
     gaps: u32,
@@ -79,19 +123,6 @@ impl SimulatorArgs {
     /// The arguments of the simulator's program.
     fn disturbance(&self) -> [String; 3] {
         [self.gaps, self.stalls, 1].map(|number| number.to_string())
-    }
-}
-
-impl HazardMode {
-    /// The configuration of a model that equals the generated hardware.
-    fn config(self) -> BoardConfig {
-        let hazards = match self {
-            Self::Interlocked => Hazards::Interlocked,
-            Self::Unchecked => Hazards::Unchecked,
-        };
-        let subnormals = Subnormals::Flush;
-        let extensions = Parameters::default().extensions();
-        BoardConfig { hazards, subnormals, extensions, ..Default::default() }
     }
 }
 
@@ -141,9 +172,8 @@ enum Verb {
     ///
     /// For tests of boards with an accelerator in another process, where no simulator can be built.
     Model {
-        /// Behaviour on a hazard
-        #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
-        hazards: HazardMode,
+        #[command(flatten)]
+        build: BuildArgs,
         /// Flips the lowest bit of the first word of this body's linear velocity
         #[arg(long, value_name = "BODY")]
         wrong: Option<usize>,
@@ -208,14 +238,15 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
         }
         Verb::Registers { simulator, cases, seed } => {
             let rtl = SimulatorProcess::start_with(&simulator.simulator, &simulator.disturbance())?;
-            let mut both = LockStep::new(&simulator.hazards.config(), Box::new(rtl), None)?;
+            let mut both = LockStep::new(&simulator.build.config(), Box::new(rtl), None)?;
             for seed in *seed..*seed + *cases {
-                let difference = match accesses::run(&mut both, seed) {
-                    Ok(true) => continue,
-                    Ok(false) => "neither ends the step".to_owned(),
-                    Err(ExternalError::Difference(difference)) => difference.to_string(),
-                    Err(error) => return Err(error.into()),
-                };
+                let difference =
+                    match accesses::run(&mut both, simulator.build.inertia.into(), seed) {
+                        Ok(true) => continue,
+                        Ok(false) => "neither ends the step".to_owned(),
+                        Err(ExternalError::Difference(difference)) => difference.to_string(),
+                        Err(error) => return Err(error.into()),
+                    };
                 writeln!(out, "seed {seed}: {difference}")?;
                 return Ok(ExitCode::FAILURE);
             }
@@ -226,17 +257,17 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
             true
         }
         Verb::Full { simulator } => {
-            let Bench { mut model, mut rtl, .. } = Bench::new(simulator)?;
-            let difference = full::first_difference(&mut *model, &mut *rtl)?;
+            let Bench { inertia, mut model, mut rtl, .. } = Bench::new(simulator)?;
+            let difference = full::first_difference(inertia, &mut *model, &mut *rtl)?;
             let text = difference.as_deref().unwrap_or("the model's outcomes with full streams");
             writeln!(out, "{text}")?;
             difference.is_none()
         }
         Verb::Errors { simulator } => run_errors(simulator, out)?,
-        Verb::Model { hazards, wrong, dies_after, hangs_after, .. } => {
+        Verb::Model { build, wrong, dies_after, hangs_after, .. } => {
             let [dies_after, hangs_after] = [*dies_after, *hangs_after];
             let flaws = Flaws { wrong: *wrong, dies_after, hangs_after };
-            let mut flawed = Flawed::new(ModelAccelerator::new(&hazards.config())?, flaws);
+            let mut flawed = Flawed::new(ModelAccelerator::new(&build.config())?, flaws);
             serve(&mut flawed, &mut io::stdin().lock(), out)?;
             true
         }
@@ -247,6 +278,7 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
 
 /// The Verilog and the model side by side.
 struct Bench {
+    inertia: Inertia,
     arrival: Arrival,
     rtl: Box<dyn ExternalAccelerator>,
     model: Box<dyn ExternalAccelerator>,
@@ -254,12 +286,14 @@ struct Bench {
 
 impl Bench {
     fn new(args: &SimulatorArgs) -> Result<Self, Failure> {
-        let SimulatorArgs { simulator, hazards, gaps, stalls } = args;
+        let SimulatorArgs { simulator, build, gaps, stalls } = args;
         let rtl = SimulatorProcess::start_with(simulator, &args.disturbance())?;
         let steady = *gaps == 0 && *stalls == 0;
         let arrival = if steady { Arrival::Steady } else { Arrival::Disturbed };
-        let model = ModelAccelerator::new(&hazards.config())?;
-        Ok(Self { arrival, rtl: Box::new(rtl), model: Box::new(model) })
+        let config = build.config();
+        let model = ModelAccelerator::new(&config)?;
+        let inertia = config.inertia;
+        Ok(Self { inertia, arrival, rtl: Box::new(rtl), model: Box::new(model) })
     }
 }
 
@@ -272,12 +306,12 @@ fn run_recorded(
     let mut good = true;
     for path in folders {
         let folder = Folder::load(path)?;
-        let scene = recorded::scene(&folder);
+        let scene = recorded::scene(&folder, bench.inertia);
         let beats = packets(&scene, None);
         let rtl = outcome::run(&mut *bench.rtl, &scene, &beats)?;
         let model = outcome::run(&mut *bench.model, &scene, &beats)?;
         let name = path.file_name().map_or(Path::new("."), Path::new).display();
-        if args.hazards == HazardMode::Interlocked {
+        if args.build.hazards == HazardMode::Interlocked {
             let (differ, all) = recorded::differences(&folder, &rtl)?;
             writeln!(out, "{name}: {differ} of {all} recorded values differ")?;
             good &= differ == 0;
@@ -308,7 +342,7 @@ fn counters(rtl: &Outcome, model: &Outcome) -> String {
 /// The first random step on which the Verilog and the model differ.
 fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<String>, Failure> {
     for seed in seed..seed + cases {
-        let case = random::case(seed);
+        let case = random::case(seed, bench.inertia);
         let beats = packets(&case.scene, case.fault);
         let model = outcome::run(&mut *bench.model, &case.scene, &beats)?;
         let rtl = outcome::run(&mut *bench.rtl, &case.scene, &beats)?;
@@ -322,10 +356,11 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
 /// Whether the Verilog reports each error as the model does.
 fn run_errors(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure> {
     let mut bench = Bench::new(args)?;
+    let inertia = bench.inertia;
     let mut larger = |register: Register| -> Result<u32, Failure> {
         Ok(bench.model.read(register.offset)?.max(bench.rtl.read(register.offset)?))
     };
-    let all = refusals(larger(BODY_CAPACITY)?, larger(COLLISION_CAPACITY)?);
+    let all = refusals(inertia, larger(BODY_CAPACITY)?, larger(COLLISION_CAPACITY)?);
     let mut good = true;
     writeln!(out, "{:31} {:>4}  {:27} {:27}", "mistake", "code", "model", "hardware")?;
     for Refusal { name, code, scene, fault, registers } in all {
@@ -345,36 +380,49 @@ fn run_errors(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure
     Ok(good)
 }
 
-/// Whether the design as it is shows no difference, and each mutant one.
+/// Whether each design as it is shows no difference, and each mutant of it one.
 fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<bool, Failure> {
-    let files = emit::files(&Design::new(Parameters::default()));
-    if let Some(difference) = difference_of(&files, cases)? {
-        writeln!(out, "the design without a mutation: {difference}")?;
-        return Ok(false);
-    }
-    writeln!(out, "the design without a mutation: no difference in {cases} steps")?;
     let mut all_found = true;
-    for mutation in MUTATIONS {
-        if !only.is_empty() && !only.iter().any(|text| mutation.name.contains(text)) {
+    for form in [InertiaForm::Isotropic, InertiaForm::World] {
+        let inertia = form.into();
+        let chosen = |mutation: &&Mutation| {
+            mutation.inertia == inertia
+                && (only.is_empty() || only.iter().any(|text| mutation.name.contains(text)))
+        };
+        let mut mutations = MUTATIONS.iter().filter(chosen).peekable();
+        if mutations.peek().is_none() {
             continue;
         }
-        let mutant = mutation.apply(&files).ok_or("the text of a mutation is not in its file")?;
-        let found = difference_of(&mutant, cases)?;
-        let by = found.as_deref().unwrap_or("NOT FOUND");
-        writeln!(out, "{}: {by}", mutation.name)?;
-        out.flush()?;
-        all_found &= found.is_some();
+        let files = emit::files(&Design::new(Parameters::with(inertia)));
+        if let Some(difference) = difference_of(&files, form, cases)? {
+            writeln!(out, "the design with {inertia:?} inertia, without a mutation: {difference}")?;
+            return Ok(false);
+        }
+        writeln!(out, "the design with {inertia:?} inertia: no difference in {cases} steps")?;
+        for mutation in mutations {
+            let mutant =
+                mutation.apply(&files).ok_or("the text of a mutation is not in its file")?;
+            let found = difference_of(&mutant, form, cases)?;
+            let by = found.as_deref().unwrap_or("NOT FOUND");
+            writeln!(out, "{}: {by}", mutation.name)?;
+            out.flush()?;
+            all_found &= found.is_some();
+        }
     }
     Ok(all_found)
 }
 
 /// Builds a simulator of these files; the first random step, or step with full streams, on which it and the
 /// model differ.
-fn difference_of(files: &[File], cases: u64) -> Result<Option<String>, Failure> {
+fn difference_of(
+    files: &[File],
+    inertia: InertiaForm,
+    cases: u64,
+) -> Result<Option<String>, Failure> {
     let folder = tempfile::tempdir()?;
     let mut args = SimulatorArgs {
         simulator: simulator::build_files(files, folder.path(), Waveform::None)?,
-        hazards: HazardMode::Interlocked,
+        build: BuildArgs { hazards: HazardMode::Interlocked, inertia },
         gaps: 0,
         stalls: 0,
     };
@@ -385,5 +433,5 @@ fn difference_of(files: &[File], cases: u64) -> Result<Option<String>, Failure> 
     // Without hazards the issue soon waits for a stream that lags behind the others.
     args.gaps = 300;
     let mut bench = Bench::new(&args)?;
-    Ok(full::first_difference(&mut *bench.model, &mut *bench.rtl)?)
+    Ok(full::first_difference(bench.inertia, &mut *bench.model, &mut *bench.rtl)?)
 }

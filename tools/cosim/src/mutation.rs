@@ -1,5 +1,6 @@
 //! Seeded mistakes in the Verilog, to show that the co-simulation finds their kinds.
 
+use pgs_interface::profile::Inertia;
 use rtlgen::emit::File;
 
 /// A mistake: a text that stands once in a file, and the wrong text in its place.
@@ -7,6 +8,8 @@ use rtlgen::emit::File;
 pub struct Mutation {
     /// A description of the mistake.
     pub name: &'static str,
+    /// The build that it is planted in.
+    pub inertia: Inertia,
     /// The file of the generated folder.
     pub file: &'static str,
     /// The text as it should be.
@@ -19,135 +22,213 @@ pub struct Mutation {
 pub const MUTATIONS: &[Mutation] = &[
     Mutation {
         name: "a delay of the contact pipeline is one slot short",
+        inertia: Inertia::Isotropic,
         file: "contact.v",
         right: "delay #(.WIDTH(32), .SLOTS(36)) delay_linear_a_x_d36",
         wrong: "delay #(.WIDTH(32), .SLOTS(35)) delay_linear_a_x_d36",
     },
     Mutation {
         name: "an operand of the friction pipeline is bound to another value",
+        inertia: Inertia::Isotropic,
         file: "friction.v",
         right: "fmin_or_0_b = phase0_fmin_or_0 ? limit_product_d37 : limit_product_d1;",
         wrong: "fmin_or_0_b = phase0_fmin_or_0 ? limit_product_d1 : limit_product_d37;",
     },
     Mutation {
         name: "the gate of an unused contact point is lost",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: "wire [3:0] used = {points > 3'd3,",
         wrong: "wire [3:0] used = {points > 3'd2,",
     },
     Mutation {
         name: "the hazard window is one slot short",
+        inertia: Inertia::Isotropic,
         file: "issue.v",
         right: "under_way[CONTACT_WINDOW/2-2]",
         wrong: "under_way[CONTACT_WINDOW/2-3]",
     },
     Mutation {
         name: "a static body keeps the velocity of its words",
+        inertia: Inertia::Isotropic,
         file: "loader.v",
         right: "(lookup_moves | kinematic) ? velocity_s2 : 192'd0",
         wrong: "(lookup_moves | 1'b1) ? velocity_s2 : 192'd0",
     },
     Mutation {
         name: "TLAST of the results comes one beat early",
+        inertia: Inertia::Isotropic,
         file: "sender.v",
         right: "row_is_last <= rows_left == 20'd2;",
         wrong: "row_is_last <= rows_left == 20'd3;",
     },
     Mutation {
         name: "the sum of the received words forgets a word",
+        inertia: Inertia::Isotropic,
         file: "word_sum.v",
         right: "low_s1   <= beat[31:0] + beat[63:32];",
         wrong: "low_s1   <= beat[31:0];",
     },
     Mutation {
         name: "the friction impulses do not start at 0",
+        inertia: Inertia::Isotropic,
         file: "impulses.v",
         right: "assign impulse1 = all_are_zero ? 32'd0 : inner[31:0];",
         wrong: "assign impulse1 = inner[31:0];",
     },
     Mutation {
         name: "the adder loses its sticky bit",
+        inertia: Inertia::Isotropic,
         file: "fadd.v",
         right: "lost_in_2s | lost_in_1;",
         wrong: "lost_in_2s | (lost_in_1 & shifted[1]);",
     },
     Mutation {
         name: "a body that moves and weighs nothing counts as static",
+        inertia: Inertia::Isotropic,
         file: "body_shapes.v",
         right: "inverse_mass[table_address] <= {|table_in[30:0], table_in};",
         wrong: "inverse_mass[table_address] <= {|table_in[30:23], table_in};",
     },
     Mutation {
         name: "each collision has the friction of the step",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: "<= pair_friction ? own_friction : friction_coefficient;",
         wrong: "<= friction_coefficient;",
     },
     Mutation {
         name: "the spin damping is no argument",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: ".spin_damping(spin_damping),\n    .impulse0",
         wrong: ".spin_damping(32'h3dcccccd),\n    .impulse0",
     },
     Mutation {
         name: "a warm pass reads 0 for the given impulses",
+        inertia: Inertia::Isotropic,
         file: "impulses.v",
         right: "wire all_are_zero  = first_of_kind & ~warm;",
         wrong: "wire all_are_zero  = first_of_kind;",
     },
     Mutation {
         name: "a warm contact pass applies no impulse that pulls",
+        inertia: Inertia::Isotropic,
         file: "fmax_or.v",
         right: "~condition ? c :",
         wrong: "~condition ? (c[31] ? 32'd0 : c) :",
     },
     Mutation {
         name: "a warm friction pass solves its second impulse",
+        inertia: Inertia::Isotropic,
         file: "fmin_or.v",
         right: "~condition ? c :",
         wrong: "(~condition & c[0]) ? c :",
     },
     Mutation {
         name: "a warm pass takes the given impulse from itself",
+        inertia: Inertia::Isotropic,
         file: "contact.v",
         right: "(solves ? {~impulse3_d123[31], impulse3_d123[30:0]} : 32'h80000000)",
         wrong: "{~impulse3_d123[31], impulse3_d123[30:0]}",
     },
     Mutation {
         name: "a warm friction pass damps the spin",
+        inertia: Inertia::Isotropic,
         file: "flogic_and.v",
         right: "y <= a & b;",
         wrong: "y <= a;",
     },
     Mutation {
         name: "the friction impulses change places as they leave",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: "impulse_row   <= friction ? {64'd0, friction_impulses} :",
         wrong: "impulse_row   <= friction ? {64'd0, friction_impulses[31:0], friction_impulses[63:32]} :",
     },
     Mutation {
         name: "the impulses leave after every pass",
+        inertia: Inertia::Isotropic,
         file: "step_sequence.v",
         right: "next_sends <= impulses_out & next_is_last;",
         wrong: "next_sends <= impulses_out;",
     },
     Mutation {
         name: "a collision enters its last pass without room for its impulses",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: ".streams_ready(beats_there & (room[0] | ~next_sends))",
         wrong: ".streams_ready(beats_there)",
     },
     Mutation {
         name: "a collision enters a warm pass without its impulses",
+        inertia: Inertia::Isotropic,
         file: "core.v",
         right: "(next_warm ? count[3] >= beats_needed : there[3])",
         wrong: "there[3]",
     },
     Mutation {
         name: "every pass on stream 3 is as long as a warm one",
+        inertia: Inertia::Isotropic,
         file: "receiver.v",
         right: "begin_packet(next_segment, next_is_warm);",
         wrong: "begin_packet(next_segment, warm_start);",
+    },
+    Mutation {
+        name: "two products of inertia change places",
+        inertia: Inertia::World,
+        file: "contact.v",
+        right: "inverse_inertia_a_xz = inverse_inertia_a[159:128];",
+        wrong: "inverse_inertia_a_xz = inverse_inertia_a[191:160];",
+    },
+    Mutation {
+        name: "the friction passes give body B the inertia of body A",
+        inertia: Inertia::World,
+        file: "core.v",
+        right: ".inverse_inertia_b(mass_b[PROPERTIES-1:32]),\n    .per_count",
+        wrong: ".inverse_inertia_b(mass_a[PROPERTIES-1:32]),\n    .per_count",
+    },
+    Mutation {
+        name: "a product of inertia comes a slot early in the friction pipeline",
+        inertia: Inertia::World,
+        file: "friction.v",
+        right: "delay #(.WIDTH(32), .SLOTS(49)) delay_inverse_inertia_a_yz_d49",
+        wrong: "delay #(.WIDTH(32), .SLOTS(48)) delay_inverse_inertia_a_yz_d49",
+    },
+    Mutation {
+        name: "a body that brings no mass has that of its shape",
+        inertia: Inertia::World,
+        file: "world_bodies.v",
+        right: "streamed_masses ? {",
+        wrong: "(streamed_masses & |diagonal[126:96]) ? {",
+    },
+    Mutation {
+        name: "a streamed mass of subnormal size counts as none",
+        inertia: Inertia::World,
+        file: "world_bodies.v",
+        right: "? {|diagonal[126:96], diagonal[127:96]}",
+        wrong: "? {|diagonal[126:119], diagonal[127:96]}",
+    },
+    Mutation {
+        name: "a body that brings its mass needs a shape of the table",
+        inertia: Inertia::World,
+        file: "loader.v",
+        right: "write_s1 & beyond_s1 & names_shape;",
+        wrong: "write_s1 & beyond_s1;",
+    },
+    Mutation {
+        name: "one body with world inertia has the beats of an isotropic one",
+        inertia: Inertia::World,
+        file: "receiver.v",
+        right: "& (of == VELOCITIES)) ? one_body\n",
+        wrong: "& (of == VELOCITIES)) ? body_beats_one\n",
+    },
+    Mutation {
+        name: "the load with world inertia does not wait for the last row",
+        inertia: Inertia::World,
+        file: "bodies.v",
+        right: ".there(&there), .linear",
+        wrong: ".there(&there[2:0]), .linear",
     },
 ];
 
@@ -173,9 +254,14 @@ mod tests {
 
     #[test]
     fn every_mutation_has_its_place() {
-        let files = emit::files(&Design::new(Parameters::default()));
+        let [isotropic, world] = [Inertia::Isotropic, Inertia::World]
+            .map(|inertia| emit::files(&Design::new(Parameters::with(inertia))));
         for mutation in MUTATIONS {
-            assert!(mutation.apply(&files).is_some(), "{}", mutation.name);
+            let files = match mutation.inertia {
+                Inertia::Isotropic => &isotropic,
+                Inertia::World => &world,
+            };
+            assert!(mutation.apply(files).is_some(), "{}", mutation.name);
         }
     }
 }

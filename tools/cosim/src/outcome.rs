@@ -180,7 +180,8 @@ fn flags_of(arguments: &Arguments) -> u32 {
     let word = flags::KINEMATIC.put(word, arguments.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, arguments.pair_friction.into());
     let word = flags::WARM_START.put(word, arguments.warm_start.into());
-    flags::IMPULSES_OUT.put(word, arguments.impulses_out.into())
+    let word = flags::IMPULSES_OUT.put(word, arguments.impulses_out.into());
+    flags::STREAMED_MASSES.put(word, arguments.streamed_masses.into())
 }
 
 pub(crate) fn set_up(

@@ -2,6 +2,7 @@
 //! and 3).
 
 use bitstream_model::external::StreamBeat;
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::Beat;
 
 use crate::scene::{Body, Collision, Scene};
@@ -39,7 +40,8 @@ pub type Beats = [Vec<StreamBeat>; STREAMS];
 /// The packets of a step, with at most one fault.
 #[must_use]
 pub fn packets(scene: &Scene, fault: Option<FaultAt>) -> Beats {
-    let velocities: Vec<Vec<[u32; 4]>> = scene.bodies.iter().map(velocity_rows).collect();
+    let velocities: Vec<Vec<[u32; 4]>> =
+        scene.bodies.iter().map(|body| velocity_rows(body, scene.inertia)).collect();
     let poses: Vec<Vec<[u32; 4]>> = scene.bodies.iter().map(pose_rows).collect();
     let collisions: Vec<Vec<[u32; 4]>> = scene.collisions.iter().map(collision_rows).collect();
     let warm = [0, 1].map(|kind| {
@@ -107,8 +109,13 @@ fn with([x, y, z]: [u32; 3], w: u32) -> [u32; 4] {
     [x, y, z, w]
 }
 
-fn velocity_rows(body: &Body) -> Vec<[u32; 4]> {
-    vec![with(body.linear, body.shape), with(body.angular, 0)]
+fn velocity_rows(body: &Body, inertia: Inertia) -> Vec<[u32; 4]> {
+    let mut rows = vec![with(body.linear, body.shape), with(body.angular, 0)];
+    if inertia == Inertia::World {
+        let [xx, yy, zz, xy, xz, yz] = body.inverse_inertia;
+        rows.extend([[xx, yy, zz, body.inverse_mass], [xy, xz, yz, 0]]);
+    }
+    rows
 }
 
 fn pose_rows(body: &Body) -> Vec<[u32; 4]> {

@@ -1,5 +1,6 @@
 //! Random scenes of every kind that the interface permits, and of kinds that it refuses.
 
+use pgs_interface::profile::Inertia;
 use pgs_interface::profile::solver::SPIN_DAMPING;
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_interface::record::collision::{FRICTION_BITS, FRICTION_SHIFT};
@@ -88,6 +89,8 @@ impl Draw {
             position: self.vector(5.0),
             orientation: self.orientation(),
             shape: self.below(shapes),
+            inverse_inertia: [0; 6],
+            inverse_mass: 0,
         }
     }
 
@@ -158,6 +161,32 @@ impl Draw {
         }
     }
 
+    /// Inertias about world axes, any numbers; and in two steps of three the masses of the bodies, by which
+    /// hardly ever another body is static than by the shapes.
+    fn world(&mut self, scene: &mut Scene) {
+        scene.inertia = Inertia::World;
+        scene.arguments.streamed_masses = !self.one_in(3);
+        for body in &mut scene.bodies {
+            let size = if self.one_in(3) { 0.0 } else { 2.0 };
+            let diagonal = [0; 3].map(|_| (self.number(3.0).abs() + 0.01).to_bits());
+            let [xx, yy, zz] = if self.one_in(8) { self.vector(3.0) } else { diagonal };
+            let [xy, xz, yz] = self.vector(size);
+            body.inverse_inertia = [xx, yy, zz, xy, xz, yz];
+            let shape = scene.shapes.get(body.shape as usize);
+            let of_shape = shape.map_or(1.0_f32.to_bits(), |shape| shape.inverse_mass);
+            let moves = if self.one_in(200) { self.one_in(2) } else { of_shape != 0 };
+            body.inverse_mass = match self.below(6) {
+                0 => of_shape,
+                1 if !moves => NEGATIVE_ZERO,
+                _ => self.shape(moves).inverse_mass,
+            };
+            // The shape means nothing then.
+            if scene.arguments.streamed_masses && self.one_in(2) {
+                body.shape = self.0.bits();
+            }
+        }
+    }
+
     /// Something that the accelerator refuses.
     fn spoil(&mut self, case: &mut Case) {
         let scene = &mut case.scene;
@@ -186,9 +215,9 @@ impl Draw {
     }
 }
 
-/// A case; the same for the same seed.
+/// A case for an accelerator with that form of inertia; the same for the same seed.
 #[must_use]
-pub fn case(seed: u64) -> Case {
+pub fn case(seed: u64, inertia: Inertia) -> Case {
     let mut draw = Draw(SplitMix64::new(seed));
     let iterations = |draw: &mut Draw| if draw.one_in(5) { 0 } else { 1 + draw.below(3) };
     let arguments = Arguments {
@@ -199,6 +228,7 @@ pub fn case(seed: u64) -> Case {
         pair_friction: false,
         warm_start: false,
         impulses_out: false,
+        streamed_masses: false,
         numbers: [
             (1.0_f32 / 60.0).to_bits(),
             draw.number(0.02).abs().to_bits(),
@@ -216,7 +246,13 @@ pub fn case(seed: u64) -> Case {
     }
     let bodies = if draw.one_in(10) { 1 + draw.below(3) } else { 2 + draw.below(40) };
     let shape_count = u32::try_from(shapes.len()).unwrap_or(1);
-    let mut scene = Scene { shapes, bodies: Vec::new(), collisions: Vec::new(), arguments };
+    let mut scene = Scene {
+        inertia: Inertia::Isotropic,
+        shapes,
+        bodies: Vec::new(),
+        collisions: Vec::new(),
+        arguments,
+    };
     scene.bodies = (0..bodies).map(|_| draw.body(shape_count)).collect();
     // One body at least moves, and a collision needs a second one.
     scene.bodies[0].shape = 0;
@@ -251,6 +287,9 @@ pub fn case(seed: u64) -> Case {
         // So light that J is 0.
         case.scene.shapes[0].inverse_mass = f32::MAX.to_bits();
     }
+    if inertia == Inertia::World {
+        draw.world(&mut case.scene);
+    }
     case
 }
 
@@ -258,31 +297,49 @@ pub fn case(seed: u64) -> Case {
 mod tests {
     use super::*;
 
+    const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
+
     #[test]
     fn a_seed_gives_the_same_case_and_another_one_another() {
-        assert_eq!(case(7).scene, case(7).scene);
-        assert_ne!(case(7).scene, case(8).scene);
+        for inertia in FORMS {
+            assert_eq!(case(7, inertia).scene, case(7, inertia).scene);
+            assert_ne!(case(7, inertia).scene, case(8, inertia).scene);
+        }
     }
 
     #[test]
     fn every_kind_comes_up() {
-        let cases: Vec<Case> = (0..400).map(case).collect();
-        assert!(cases.iter().any(|case| case.fault.is_some()));
-        assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
-        assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
-        for warm in [false, true] {
-            for out in [false, true] {
-                let has = |case: &Case| {
-                    let arguments = &case.scene.arguments;
-                    (arguments.warm_start, arguments.impulses_out) == (warm, out)
-                };
-                assert!(cases.iter().any(|case| has(case) && case.fault.is_none()));
-                assert!(cases.iter().any(|case| has(case) && case.fault.is_some()));
+        for inertia in FORMS {
+            let cases: Vec<Case> = (0..400).map(|seed| case(seed, inertia)).collect();
+            assert!(cases.iter().all(|case| case.scene.inertia == inertia));
+            assert!(cases.iter().any(|case| case.fault.is_some()));
+            assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
+            assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
+            for warm in [false, true] {
+                for out in [false, true] {
+                    let has = |case: &Case| {
+                        let arguments = &case.scene.arguments;
+                        (arguments.warm_start, arguments.impulses_out) == (warm, out)
+                    };
+                    assert!(cases.iter().any(|case| has(case) && case.fault.is_none()));
+                    assert!(cases.iter().any(|case| has(case) && case.fault.is_some()));
+                }
+            }
+            for count in 0..=5 {
+                let has =
+                    |collision: &Collision| (collision.count & !FRICTION_BITS).min(5) == count;
+                assert!(cases.iter().any(|case| case.scene.collisions.iter().any(has)), "{count}");
             }
         }
-        for count in 0..=5 {
-            let has = |collision: &Collision| (collision.count & !FRICTION_BITS).min(5) == count;
-            assert!(cases.iter().any(|case| case.scene.collisions.iter().any(has)), "{count}");
-        }
+    }
+
+    #[test]
+    fn masses_are_streamed_with_world_inertia_alone() {
+        let streams = |inertia| {
+            let streamed = |seed| case(seed, inertia).scene.arguments.streamed_masses;
+            (0..400).filter(|seed| streamed(*seed)).count()
+        };
+        assert_eq!(streams(Inertia::Isotropic), 0);
+        assert!((200..350).contains(&streams(Inertia::World)));
     }
 }

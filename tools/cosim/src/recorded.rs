@@ -1,5 +1,6 @@
 //! Recorded steps: a folder's scene, and its results as bits.
 
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::CONTACT_POINTS;
 use step_folder::folder::{Folder, State};
 use step_folder::npy::{Dimensions, NpyError, read};
@@ -8,21 +9,30 @@ use zynq_pgs::Body as DriverBody;
 use crate::outcome::Outcome;
 use crate::scene::{Arguments, Body, Collision, Scene, Shape};
 
-/// The scene of a folder, in the order of its arrays.
+/// The scene of a folder, in the order of its arrays, for an accelerator with that form of inertia. The
+/// shapes of the folder have one moment of inertia about every axis; with world inertia each body brings
+/// it, and its mass.
 #[must_use]
-pub fn scene(folder: &Folder) -> Scene {
+pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
     let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
     let position = |body: usize| bits(folder.bodies[body].pose.position);
     let shapes = folder.shapes.iter().map(|shape| Shape {
         inverse_mass: shape.inverse_mass.to_bits(),
         inverse_inertia: shape.inverse_inertia[0].to_bits(),
     });
+    let shape_of = |body: &DriverBody| folder.shapes.get(body.shape as usize);
+    let world = |body: &DriverBody| {
+        let moment = shape_of(body).map_or(0.0, |shape| shape.inverse_inertia[0]);
+        [moment, moment, moment, 0.0, 0.0, 0.0].map(f32::to_bits)
+    };
     let bodies = folder.bodies.iter().map(|body| Body {
         linear: bits(body.velocity.linear),
         angular: bits(body.velocity.angular),
         position: bits(body.pose.position),
         orientation: body.pose.orientation.map(f32::to_bits),
         shape: body.shape,
+        inverse_inertia: world(body),
+        inverse_mass: shape_of(body).map_or(0, |shape| shape.inverse_mass.to_bits()),
     });
     let collisions = folder.collisions.iter().map(|collision| {
         let mut points = [[0; 4]; CONTACT_POINTS];
@@ -42,6 +52,7 @@ pub fn scene(folder: &Folder) -> Scene {
     });
     let parameters = &folder.parameters;
     Scene {
+        inertia,
         shapes: shapes.collect(),
         bodies: bodies.collect(),
         collisions: collisions.collect(),
@@ -53,6 +64,7 @@ pub fn scene(folder: &Folder) -> Scene {
             pair_friction: parameters.pair_friction,
             warm_start: false,
             impulses_out: parameters.impulses_out,
+            streamed_masses: inertia == Inertia::World,
             numbers: [
                 parameters.time_step,
                 parameters.position_drift,

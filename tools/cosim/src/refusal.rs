@@ -1,6 +1,7 @@
 //! Steps that the accelerator refuses: for each of its error codes one that leads to it.
 
 use pgs_interface::control::{BODIES, COLLISIONS, CONTACT_ITERATIONS, ErrorCode};
+use pgs_interface::profile::Inertia;
 use pgs_interface::register::Register;
 
 use crate::packets::{Fault, FaultAt};
@@ -25,7 +26,7 @@ pub struct Refusal {
 const WRONG: usize = 3;
 
 /// Five bodies in a row, the last one static, and a collision of each with its neighbour.
-fn scene() -> Scene {
+fn scene(inertia: Inertia) -> Scene {
     let one = 1.0_f32.to_bits();
     let moves = Shape { inverse_mass: one, inverse_inertia: one };
     let fixed = Shape { inverse_mass: 0, inverse_inertia: 0 };
@@ -38,6 +39,8 @@ fn scene() -> Scene {
             position: [x.to_bits(), 0, 0],
             orientation: [0, 0, 0, one],
             shape: u32::from(index == 4),
+            inverse_inertia: [one, one, one, 0, 0, 0],
+            inverse_mass: one,
         })
         .collect();
     let collisions = (0..4_u32).map(|body| {
@@ -59,17 +62,25 @@ fn scene() -> Scene {
         pair_friction: false,
         warm_start: false,
         impulses_out: true,
+        streamed_masses: false,
         numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
         gravity: [0, (-9.8_f32).to_bits(), 0],
     };
-    Scene { shapes: vec![moves, fixed], collisions: collisions.collect(), bodies, arguments }
+    Scene {
+        inertia,
+        shapes: vec![moves, fixed],
+        collisions: collisions.collect(),
+        bodies,
+        arguments,
+    }
 }
 
 /// At least one step for each error code of a design that streams the collisions once a pass.
 /// `collisions_max` and `bodies_max` are the larger of the capacities of the accelerators.
 #[must_use]
-pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
-    let plain = |name, code| Refusal { name, code, scene: scene(), fault: None, registers: vec![] };
+pub fn refusals(inertia: Inertia, bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
+    let plain =
+        |name, code| Refusal { name, code, scene: scene(inertia), fault: None, registers: vec![] };
     let changed = |name, code, change: fn(&mut Scene)| {
         let mut refusal = plain(name, code);
         change(&mut refusal.scene);
@@ -88,7 +99,7 @@ pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
         registers: registers.to_vec(),
         ..plain(name, code)
     };
-    vec![
+    let mut all = vec![
         changed("body index beyond the bodies", ErrorCode::BodyIndex, |scene| {
             scene.collisions[WRONG].bodies[0] = 5;
         }),
@@ -124,7 +135,32 @@ pub fn refusals(bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
         warm("no TLAST, warm friction pass", ErrorCode::TlastMissing, Fault::NoLast, 4, 3, 0),
         warm("no TLAST, friction after warm", ErrorCode::TlastMissing, Fault::NoLast, 6, 3, 0),
         warm("invalid bytes, warm friction", ErrorCode::PartialBeat, Fault::Partial, 4, 3, 5),
-    ]
+    ];
+    if inertia == Inertia::World {
+        all.extend([
+            changed("two static by their own masses", ErrorCode::StaticPair, |scene| {
+                scene.arguments.streamed_masses = true;
+                for body in &mut scene.bodies[WRONG..] {
+                    body.inverse_mass = 0;
+                }
+            }),
+            // The shape means nothing here: the first mistake of the step is a later one.
+            changed("with itself, any shape index", ErrorCode::SelfCollision, |scene| {
+                scene.arguments.streamed_masses = true;
+                scene.bodies[WRONG].shape = 64;
+                scene.collisions[WRONG].bodies = [2; 2];
+            }),
+            faulty(
+                "TLAST early, last row of a body",
+                ErrorCode::TlastEarly,
+                Fault::EarlyLast,
+                0,
+                3,
+                3,
+            ),
+        ]);
+    }
+    all
 }
 
 #[cfg(test)]
@@ -133,10 +169,12 @@ mod tests {
 
     #[test]
     fn every_code_that_a_design_with_passes_has_is_there() {
-        let all = refusals(1, 1);
-        for code in ErrorCode::ALL {
-            let windowed = matches!(code, ErrorCode::EmptyPlace | ErrorCode::Deadlock);
-            assert_eq!(all.iter().any(|refusal| refusal.code == code), !windowed, "{code:?}");
+        for inertia in [Inertia::Isotropic, Inertia::World] {
+            let all = refusals(inertia, 1, 1);
+            for code in ErrorCode::ALL {
+                let windowed = matches!(code, ErrorCode::EmptyPlace | ErrorCode::Deadlock);
+                assert_eq!(all.iter().any(|refusal| refusal.code == code), !windowed, "{code:?}");
+            }
         }
     }
 }

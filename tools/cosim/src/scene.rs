@@ -1,5 +1,6 @@
 //! A step as words, as an accelerator of profile `float` takes it; nothing in it need make sense.
 
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::CONTACT_POINTS;
 
 /// An entry of the shape table, as bits of f32.
@@ -24,6 +25,11 @@ pub struct Body {
     pub orientation: [u32; 4],
     /// Index of its shape.
     pub shape: u32,
+    /// Inverse inertia about world axes: xx, yy, zz, xy, xz, yz. On the streams with world inertia alone, as
+    /// the mass.
+    pub inverse_inertia: [u32; 6],
+    /// The mass that it brings; means nothing in a step without streamed masses.
+    pub inverse_mass: u32,
 }
 
 /// A collision.
@@ -60,6 +66,8 @@ pub struct Arguments {
     pub warm_start: bool,
     /// Whether the impulses go out.
     pub impulses_out: bool,
+    /// Whether each body brings its mass: with world inertia alone.
+    pub streamed_masses: bool,
     /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
     pub numbers: [u32; 6],
     /// Gravity.
@@ -69,6 +77,8 @@ pub struct Arguments {
 /// A whole step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scene {
+    /// The form of inertia of the accelerator that takes it.
+    pub inertia: Inertia,
     /// The shape table.
     pub shapes: Vec<Shape>,
     /// All bodies.

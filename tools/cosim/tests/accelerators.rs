@@ -14,19 +14,23 @@ use bitstream_model::{BoardConfig, EmulatedBoard, Subnormals};
 use cosim::flaws::{Flawed, Flaws};
 use cosim::packets::packets;
 use cosim::{accesses, outcome, random};
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::result;
 use step_folder::folder::Folder;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Error, Impulses, OpenOptions, StepParameters, WarmCollisions,
+    Accelerator, BoardChoice, Error, Impulses, OpenOptions, Shape, StepParameters, WarmCollisions,
 };
+
+const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
 fn config() -> BoardConfig {
     BoardConfig { subnormals: Subnormals::Flush, ..BoardConfig::default() }
 }
 
-fn lock_step(flaws: Flaws) -> LockStep {
-    let model = ModelAccelerator::new(&config()).expect("a model");
-    LockStep::new(&config(), Box::new(Flawed::new(model, flaws)), None).expect("a lock step")
+fn lock_step(inertia: Inertia, flaws: Flaws) -> LockStep {
+    let config = BoardConfig { inertia, ..config() };
+    let model = ModelAccelerator::new(&config).expect("a model");
+    LockStep::new(&config, Box::new(Flawed::new(model, flaws)), None).expect("a lock step")
 }
 
 fn golden(name: &str) -> Folder {
@@ -62,28 +66,32 @@ fn step(board: &EmulatedBoard, folder: &Folder) -> (Option<Error>, bool) {
 
 #[test]
 fn equals_run_random_steps_in_lock_step_without_a_difference() {
-    let mut both = lock_step(Flaws::default());
-    for seed in 1..=100 {
-        let case = random::case(seed);
-        let beats = packets(&case.scene, case.fault);
-        outcome::run(&mut both, &case.scene, &beats).unwrap_or_else(|e| panic!("{seed}: {e}"));
+    for inertia in FORMS {
+        let mut both = lock_step(inertia, Flaws::default());
+        for seed in 1..=100 {
+            let case = random::case(seed, inertia);
+            let beats = packets(&case.scene, case.fault);
+            outcome::run(&mut both, &case.scene, &beats).unwrap_or_else(|e| panic!("{seed}: {e}"));
+        }
     }
 }
 
 #[test]
 fn equals_take_random_register_accesses_alike() {
-    let mut both = lock_step(Flaws::default());
-    for seed in 1..=50 {
-        let ended = accesses::run(&mut both, seed).unwrap_or_else(|e| panic!("{seed}: {e}"));
-        assert!(ended, "{seed}");
+    for inertia in FORMS {
+        let mut both = lock_step(inertia, Flaws::default());
+        for seed in 1..=50 {
+            let ended = accesses::run(&mut both, inertia, seed);
+            assert!(ended.unwrap_or_else(|e| panic!("{seed}: {e}")), "{seed}");
+        }
     }
 }
 
 #[test]
 fn a_wrong_word_is_named_with_its_record_and_its_values() {
     let folder = golden("two_cubes");
-    let scene = cosim::recorded::scene(&folder);
-    let mut both = lock_step(Flaws { wrong: Some(1), ..Flaws::default() });
+    let scene = cosim::recorded::scene(&folder, Inertia::Isotropic);
+    let mut both = lock_step(Inertia::Isotropic, Flaws { wrong: Some(1), ..Flaws::default() });
     let error = outcome::run(&mut both, &scene, &packets(&scene, None)).expect_err("a difference");
     let ExternalError::Difference(difference) = error else { panic!("{error}") };
     let Difference { place, cycle, model, hardware, .. } = *difference;
@@ -144,6 +152,55 @@ fn the_driver_steps_warm_on_an_accelerator_in_another_process() {
     assert_eq!(ends[0], ends[1]);
 }
 
+/// More shapes than the table has, none with a number for its inertia: the masses are streamed.
+#[test]
+fn the_driver_streams_inertias_and_masses_to_an_accelerator_in_another_process() {
+    let files = tempfile::tempdir().expect("a folder");
+    let path = program(files.path(), "--inertia world");
+    let folder = golden("pile5_step60");
+    let shapes = (1_u8..=100).map(|n| {
+        let size = f32::from(n);
+        Shape { inverse_mass: 1.0 / size, inverse_inertia: [6.0 / size, 3.0 / size, 2.0 / size] }
+    });
+    let shapes: Vec<Shape> = [Shape::STATIC].into_iter().chain(shapes).collect();
+    let mut before = folder.bodies.clone();
+    for (body, shape) in before.iter_mut().zip((1..=100).cycle()) {
+        let moves = folder.shapes[body.shape as usize].inverse_mass > 0.0;
+        body.shape = if moves { shape } else { 0 };
+    }
+    let mut ends = Vec::new();
+    for external in [false, true] {
+        let mut config = BoardConfig { inertia: Inertia::World, ..config() };
+        let board = if external {
+            let simulator = SimulatorProcess::start_for(&mut config, &path).expect("a simulator");
+            let both = LockStep::new(&config, Box::new(simulator), None).expect("a lock step");
+            EmulatedBoard::with_accelerator(config, Box::new(both)).expect("a board")
+        } else {
+            EmulatedBoard::new(config).expect("a board")
+        };
+        let choice = BoardChoice::Emulated(board.cpu_port());
+        let options = OpenOptions { board: choice, ..OpenOptions::default() };
+        let mut accelerator = Accelerator::open(options).expect("open");
+        accelerator.set_shapes(&shapes).expect("shapes");
+        let mut bodies = before.clone();
+        accelerator.step(&mut bodies, &folder.collisions, &folder.parameters).expect("a step");
+        ends.push(bodies);
+    }
+    assert_ne!(ends[0], before);
+    assert_eq!(ends[0], ends[1]);
+}
+
+#[test]
+fn a_simulator_of_the_other_inertia_is_refused() {
+    let files = tempfile::tempdir().expect("a folder");
+    for (built, asked) in [("isotropic", Inertia::World), ("world", Inertia::Isotropic)] {
+        let path = program(files.path(), &format!("--inertia {built}"));
+        let mut config = BoardConfig { inertia: asked, ..config() };
+        let error = SimulatorProcess::start_for(&mut config, &path).expect_err("the other inertia");
+        assert!(error.to_string().contains(&format!("built for {built} inertia")), "{error}");
+    }
+}
+
 #[test]
 fn a_simulator_that_dies_or_hangs_in_a_step_is_named_and_the_bodies_stay() {
     let files = tempfile::tempdir().expect("a folder");
@@ -167,7 +224,8 @@ fn a_simulator_that_dies_or_hangs_in_a_step_is_named_and_the_bodies_stay() {
 
 #[test]
 fn a_difference_ends_the_step_and_the_bodies_stay() {
-    let board = board(Box::new(lock_step(Flaws { wrong: Some(1), ..Flaws::default() })));
+    let flaws = Flaws { wrong: Some(1), ..Flaws::default() };
+    let board = board(Box::new(lock_step(Inertia::Isotropic, flaws)));
     let (error, untouched) = step(&board, &golden("two_cubes"));
     assert!(error.is_some() && untouched);
     let reason = board.accelerator_error().expect("a reason");

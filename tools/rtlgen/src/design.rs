@@ -1,7 +1,7 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
 use pgs_interface::extension::Extensions;
-use pgs_interface::profile::{Depth, FLOAT};
+use pgs_interface::profile::{Depth, FLOAT, Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use crate::equations::{self, WarmStart};
@@ -26,6 +26,8 @@ pub struct Parameters {
     /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
     /// specification.
     pub smallest_normal: bool,
+    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bits 4 and 9.
+    pub inertia: Inertia,
     /// Whether impulses come in (warm start) and go out: FEATURES bit 8. Without it, bits 3 and 4 of FLAGS
     /// have no effect.
     pub warm_start: WarmStart,
@@ -35,9 +37,22 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
+        Self::with(Inertia::Isotropic)
+    }
+}
+
+impl Parameters {
+    /// The default choices with that form of inertia. World inertia takes more than twice the memory a body.
+    #[must_use]
+    pub fn with(inertia: Inertia) -> Self {
+        let (bodies, collisions) = match inertia {
+            Inertia::Isotropic => (40_960, 131_072),
+            Inertia::World => (16_384, 65_536),
+        };
         Self {
-            bodies: 40_960,
-            collisions: 131_072,
+            bodies,
+            collisions,
+            inertia,
             interlocked: true,
             address_stages: 2,
             output_stages: 3,
@@ -62,6 +77,12 @@ pub struct OddReadLatency {
 }
 
 impl Parameters {
+    /// The variant of the profile that the build is.
+    #[must_use]
+    pub fn variant(&self) -> Variant {
+        Variant { inertia: self.inertia, ..FLOAT.default_variant() }
+    }
+
     /// Refuses parameters that contradict the hand-written modules.
     ///
     /// # Errors
@@ -79,7 +100,7 @@ impl Parameters {
     /// The extensions of the interface that the build has.
     #[must_use]
     pub fn extensions(&self) -> Extensions {
-        let possible = Extensions::possible(&FLOAT.default_variant());
+        let possible = Extensions::possible(&self.variant());
         let warm_start = self.warm_start == WarmStart::Built;
         // The Verilog always takes poses in.
         Extensions { warm_start, velocities_only: false, ..possible }
@@ -137,8 +158,8 @@ impl Design {
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let interval = FLOAT.initiation_interval;
-        let contact = equations::contact(CONTACT_POINTS, parameters.warm_start);
-        let friction = equations::friction(parameters.warm_start);
+        let contact = equations::contact(CONTACT_POINTS, parameters.inertia, parameters.warm_start);
+        let friction = equations::friction(parameters.inertia, parameters.warm_start);
         Self {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
@@ -194,13 +215,18 @@ mod tests {
     use super::*;
     use crate::graph::{Kind, Operation, Source};
 
-    /// The table entry of the profile holds the figures of this schedule.
+    const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
+
+    /// The table entry of the profile holds the figures of these schedules.
     #[test]
     fn the_profile_has_the_depths_of_the_schedule() {
-        let design = Design::new(Parameters::default());
-        assert_eq!(design.depth(&design.contact), FLOAT.contact);
-        assert_eq!(design.depth(&design.friction), FLOAT.friction);
-        assert_eq!(design.step_fill(), FLOAT.integration_fill);
+        for inertia in FORMS {
+            let parameters = Parameters::with(inertia);
+            let (design, variant) = (Design::new(parameters), parameters.variant());
+            assert_eq!(design.depth(&design.contact), variant.contact(), "{inertia:?}");
+            assert_eq!(design.depth(&design.friction), variant.friction(), "{inertia:?}");
+            assert_eq!(design.step_fill(), FLOAT.integration_fill);
+        }
     }
 
     #[test]
@@ -222,13 +248,27 @@ mod tests {
     fn the_given_impulses_are_written_before_a_pipeline_reads_them() {
         // The second cycle of the slot, and the register in front of the memory.
         let written = 1 + 1;
-        let parameters =
-            Parameters { address_stages: 4, output_stages: 5, ..Parameters::default() };
-        assert_eq!(parameters.check(), Ok(()));
-        let design = Design::new(parameters);
-        for pass in [&design.contact, &design.friction] {
-            let read = unsigned(pass.schedule.impulses_at) - parameters.read_latency();
-            assert!(read > written, "{}: read at {read}", pass.name);
+        for inertia in FORMS {
+            let parameters =
+                Parameters { address_stages: 4, output_stages: 5, ..Parameters::with(inertia) };
+            assert_eq!(parameters.check(), Ok(()));
+            let design = Design::new(parameters);
+            for pass in [&design.contact, &design.friction] {
+                let read = unsigned(pass.schedule.impulses_at) - parameters.read_latency();
+                assert!(read > written, "{} with {inertia:?}: read at {read}", pass.name);
+            }
+        }
+    }
+
+    /// The product with a matrix lies in front of the velocities.
+    #[test]
+    fn world_inertia_makes_no_window_longer() {
+        let [isotropic, world] = FORMS.map(|inertia| {
+            let design = Design::new(Parameters::with(inertia));
+            [&design.contact, &design.friction].map(|pass| design.depth(pass))
+        });
+        for (isotropic, world) in isotropic.into_iter().zip(world) {
+            assert_eq!((world.window, world.fill), (isotropic.window, isotropic.fill + 14));
         }
     }
 
@@ -252,12 +292,12 @@ mod tests {
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
         // The slowest one: the second quotient, with registers before and behind the divider.
         let ready = Operation::Divide.operator().latency + 4;
-        // One pair of bodies, the set-up, and the registers in front of a pipeline.
+        // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];
-        let design = Design::new(Parameters::default());
+        let designs = FORMS.map(|inertia| Design::new(Parameters::with(inertia)));
         let mut computed = 0;
-        for Pipeline { graph, schedule, .. } in design.pipelines() {
+        for Pipeline { graph, schedule, .. } in designs.iter().flat_map(Design::pipelines) {
             for id in graph.ids() {
                 for read in graph.node(id).reads() {
                     let node = graph.node(read);
@@ -270,6 +310,9 @@ mod tests {
                 }
             }
         }
-        assert!(computed >= 7, "per_second, speed_limit, half_step, series and gravity are read");
+        assert!(
+            computed >= 2 * 7,
+            "per_second, speed_limit, half_step, series and gravity are read"
+        );
     }
 }

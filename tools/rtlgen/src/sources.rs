@@ -31,7 +31,7 @@ pub const AROUND: &[Source<'_>] = sources! {
     "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "simple_dual_port",
         "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";
-    "step/": "constants", "loader", "body_shapes", "integrator", "step_sequence";
+    "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator", "step_sequence";
     "operators/": "half_to_float";
     "pass/": "finder", "issue", "impulses", "impulse_sum";
     "": "core", "control_block", "pgs_top";

@@ -157,10 +157,14 @@ pub struct Profile {
     pub collisions_per_issue: u32,
     /// How the passes run.
     pub flow: Flow,
-    /// Contact pipeline.
+    /// Contact pipeline with isotropic inertia; [`Variant::contact`] has the one of a build.
     pub contact: Depth,
-    /// Friction pipeline.
+    /// Friction pipeline with isotropic inertia.
     pub friction: Depth,
+    /// Contact pipeline with world inertia.
+    pub world_contact: Depth,
+    /// Friction pipeline with world inertia.
+    pub world_friction: Depth,
     /// Fill of the integration, clock cycles: from the last body in to the end of the step, the
     /// control around the pipeline included. It is the same for every step.
     pub integration_fill: u32,
@@ -213,6 +217,24 @@ const SIX: u32 = 6;
 const FOUR: u32 = 4;
 
 impl Variant {
+    /// Contact pipeline.
+    #[must_use]
+    pub const fn contact(&self) -> Depth {
+        match self.inertia {
+            Inertia::Isotropic => self.profile.contact,
+            Inertia::World => self.profile.world_contact,
+        }
+    }
+
+    /// Friction pipeline.
+    #[must_use]
+    pub const fn friction(&self) -> Depth {
+        match self.inertia {
+            Inertia::Isotropic => self.profile.friction,
+            Inertia::World => self.profile.world_friction,
+        }
+    }
+
     /// Rows of a velocity record.
     #[must_use]
     pub const fn velocity_rows(&self) -> usize {

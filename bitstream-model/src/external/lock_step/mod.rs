@@ -322,6 +322,15 @@ impl ExternalAccelerator for LockStep {
         }
         self.busy = clocked.busy;
         if ended {
+            // A wrong beat stops the hardware as it arrives. The model comes to that beat with the beats of the
+            // other streams, which the hardware has not taken any more.
+            self.history.read(ERROR.offset);
+            if self.hardware.read(ERROR.offset)? != 0 {
+                let offered = offer.beats.iter().zip(&clocked.taken);
+                for (owed, (beats, taken)) in self.owed.iter_mut().zip(offered) {
+                    owed.extend(beats.iter().skip(*taken));
+                }
+            }
             self.catch_up()?;
             self.compare_step()?;
         }

@@ -21,6 +21,9 @@ pub(crate) fn external_accelerator(
             ExternalError::Hazards { simulator, .. } => {
                 format!("add --hazards {simulator}, or build the simulator with --hazards")
             }
+            ExternalError::Inertia { simulator, board } => {
+                format!("add --inertia {simulator}, or build the simulator with --inertia {board}")
+            }
             _ => return Failure::input(error),
         };
         Failure::input(error).next(next)

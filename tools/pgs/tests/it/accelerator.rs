@@ -53,6 +53,22 @@ fn another_profile_than_the_generated_one_is_refused() {
     assert!(stderr.contains("of profile float, not half"), "{stderr}");
 }
 
+/// A program that answers the reads of IDENTIFICATION and FEATURES as an interlocked accelerator with
+/// isotropic inertia.
+#[test]
+fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let isotropic =
+        program(folder.path(), "#!/bin/sh\nprintf '1SGP\\002\\000\\000\\000'\ncat >/dev/null\n");
+    let (code, stderr) = solve(&isotropic, &["--inertia", "world"]);
+    assert_eq!(code, Some(2), "{stderr}");
+    assert!(stderr.contains("built for isotropic inertia, and the board for world"), "{stderr}");
+    assert!(
+        stderr.contains("add --inertia isotropic, or build the simulator with --inertia world"),
+        "{stderr}"
+    );
+}
+
 fn serve(folder: &Path, accelerator: &str, more: &[&str]) -> Command {
     let mut command = pgs();
     command.args(["serve", "--memory-mib", "16", "--accelerator", accelerator]).args(more);

@@ -340,7 +340,7 @@ fn world_inertia_costs_cycles_and_memory() {
     let cost = row(&document, "inertia", &[("profile", "float")]);
     assert_eq!(
         (&cost["cycles_without"], &cost["cycles_with"]),
-        (&json!(2_093_336), &json!(2_112_776))
+        (&json!(2_093_336), &json!(2_112_888))
     );
     let inertia = row(&document, "ports", &[("array", "world inertia")]);
     assert_eq!(inertia["interval"], 1);

@@ -5,7 +5,7 @@ use pgs_interface::control::{
     self, ErrorCode, ITERATIONS_MAX, REGISTERS, channels, depth, dma, features, issue,
     memory_per_record, numbers,
 };
-use pgs_interface::profile::{Depth, FLOAT, solver};
+use pgs_interface::profile::{Depth, FLOAT, Inertia, solver};
 
 use crate::design::Design;
 use crate::equations::WarmStart;
@@ -65,6 +65,7 @@ pub(super) fn schedule(design: &Design) -> String {
         number("COLLISION_BITS", address_bits(parameters.collisions));
         number("DESIGN_INTERLOCKED", parameters.interlocked.into());
         number("DESIGN_SMALLEST_NORMAL", parameters.smallest_normal.into());
+        number("DESIGN_WORLD_INERTIA", (parameters.inertia == Inertia::World).into());
         number("DESIGN_WARM_START", (parameters.warm_start == WarmStart::Built).into());
         number("SHAPES", FLOAT.shape_capacity.into());
         number("MEMORY_ADDRESS_STAGES", parameters.address_stages.into());
@@ -85,7 +86,7 @@ pub(super) fn schedule(design: &Design) -> String {
 
 fn capabilities(text: &mut Text, design: &Design) {
     let parameters = &design.parameters;
-    let variant = FLOAT.default_variant();
+    let variant = parameters.variant();
     let (body, collision) = (variant.bytes_per_body(), variant.bytes_per_collision());
     let widths = |streams: &[u32]| {
         streams.iter().rev().fold(0, |word, bits| (word << 4) | (bits / 8).ilog2())
@@ -95,6 +96,7 @@ fn capabilities(text: &mut Text, design: &Design) {
     let features = features::CHECKSUMS.mask()
         | features::IMPULSE_SUM.mask()
         | features::FLUSH_SUBNORMALS.mask()
+        | features::WORLD_INERTIA.put(0, (parameters.inertia == Inertia::World).into())
         | features::INTERLOCKED.put(0, parameters.interlocked.into())
         | parameters.extensions().features();
     let words = [

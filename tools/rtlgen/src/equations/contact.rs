@@ -6,6 +6,8 @@
 //!   l = (e + b) * J;  u = max(L_i + l, 0);  l = u - L_i;  L_i = u;  apply
 //! ```
 
+use pgs_interface::profile::Inertia;
+
 use super::row::{self, Row};
 use super::warm::{Warm, WarmStart};
 use crate::graph::{Graph, Source};
@@ -19,13 +21,13 @@ use crate::graph::{Graph, Source};
 /// with J. The impulse of an unused point means nothing, and its flag keeps it from every sum. Where
 /// impulses leave the chip, both are put out as 0.
 #[must_use]
-pub fn contact(points: usize, warm_start: WarmStart) -> Graph {
+pub fn contact(points: usize, inertia: Inertia, warm_start: WarmStart) -> Graph {
     let mut graph = Graph::default();
     let g = &mut graph;
     let warm = Warm::new(g, warm_start);
     let normal = g.input3(Source::Record, "normal");
     let positions = row::SIDES.map(|side| g.input3(Source::Record, &format!("position_{side}")));
-    let masses = row::masses(g);
+    let masses = row::masses(g, inertia);
     let mut velocities = row::velocities(g);
     let [per_second, drift, coefficient] =
         ["per_second", "drift", "coefficient"].map(|name| g.input(Source::Argument, name));

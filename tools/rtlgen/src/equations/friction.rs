@@ -14,6 +14,7 @@
 //!                                  t_0 = (-n.y*k, n.x*k, 0)   t_1 = (-n.z*t_0.y, n.z*t_0.x, s*k)
 //! ```
 
+use pgs_interface::profile::Inertia;
 use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -26,13 +27,13 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 /// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal impulse that the last contact pass stored, and
 /// `one_static` tells whether a body of the collision is static.
 #[must_use]
-pub fn friction(warm_start: WarmStart) -> Graph {
+pub fn friction(inertia: Inertia, warm_start: WarmStart) -> Graph {
     let mut graph = Graph::default();
     let g = &mut graph;
     let warm = Warm::new(g, warm_start);
     let normal = g.input3(Source::Record, "normal");
     let positions = row::SIDES.map(|side| g.input3(Source::Record, &format!("position_{side}")));
-    let masses = row::masses(g);
+    let masses = row::masses(g, inertia);
     let per_count = g.input(Source::Record, "per_count");
     let one_static = g.input(Source::Flag, "one_static");
     let always = g.input(Source::Flag, "used0");

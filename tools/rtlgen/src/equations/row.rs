@@ -4,16 +4,47 @@
 //! row(t, rA, rB):  aA = cross(rA, t)   aB = -cross(rB, t)
 //!                  J = -1 / (((mA + dot(aA*KA, aA)) + mB) + dot(aB*KB, aB))
 //!                  e = ((dot(t,vA) + dot(aA,wA)) + dot(-t,vB)) + dot(aB,wB)
+//! v*K = (v.x*K, v.y*K, v.z*K), or with world inertia
+//!       ((xx*v.x + xy*v.y) + xz*v.z, (xy*v.x + yy*v.y) + yz*v.z, (xz*v.x + yz*v.y) + zz*v.z)
 //! apply(row, l):   vA += (t*mA)*l   wA += (aA*KA)*l   vB += ((-t)*mB)*l   wB += (aB*KB)*l
 //! ```
 
-use crate::graph::{Graph, Operand, Source, Vec3};
+use pgs_interface::profile::Inertia;
+
+use crate::graph::{Graph, Operand, Source, Symmetric, Vec3};
+
+/// Inverse inertia K of a body.
+#[derive(Debug, Clone, Copy)]
+enum InverseInertia {
+    /// The same about every axis.
+    Number(Operand),
+    /// About world axes.
+    Matrix(Symmetric),
+}
+
+impl InverseInertia {
+    fn new(graph: &mut Graph, side: &str, inertia: Inertia) -> Self {
+        let name = format!("inverse_inertia_{side}");
+        match inertia {
+            Inertia::Isotropic => Self::Number(graph.input(Source::Record, &name)),
+            Inertia::World => Self::Matrix(graph.input_symmetric(Source::Record, &name)),
+        }
+    }
+
+    /// v*K
+    fn times(self, graph: &mut Graph, v: Vec3) -> Vec3 {
+        match self {
+            Self::Number(number) => graph.scale(v, number),
+            Self::Matrix(matrix) => graph.times(v, matrix),
+        }
+    }
+}
 
 /// Inverse mass m and inverse inertia K of a body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mass {
     inverse_mass: Operand,
-    inverse_inertia: Operand,
+    inverse_inertia: InverseInertia,
 }
 
 /// Velocities of a body while a collision is being solved.
@@ -27,10 +58,10 @@ pub(super) struct Velocity {
 pub(super) const SIDES: [&str; 2] = ["a", "b"];
 
 /// The inputs of the mass properties of both bodies.
-pub(super) fn masses(graph: &mut Graph) -> [Mass; 2] {
+pub(super) fn masses(graph: &mut Graph, inertia: Inertia) -> [Mass; 2] {
     SIDES.map(|side| Mass {
         inverse_mass: graph.input(Source::Record, &format!("inverse_mass_{side}")),
-        inverse_inertia: graph.input(Source::Record, &format!("inverse_inertia_{side}")),
+        inverse_inertia: InverseInertia::new(graph, side, inertia),
     })
 }
 
@@ -74,7 +105,7 @@ impl Row {
             let moment_a = graph.cross(arms[0], direction);
             let moment_b = graph.cross(arms[1], direction).negated();
             let moments = [moment_a, moment_b];
-            let turned = [0, 1].map(|i| graph.scale(moments[i], masses[i].inverse_inertia));
+            let turned = [0, 1].map(|i| masses[i].inverse_inertia.times(graph, moments[i]));
             let [spin_a, spin_b] = [0, 1].map(|i| graph.dot(turned[i], moments[i]));
             let sum = graph.add(masses[0].inverse_mass, spin_a);
             let sum = graph.add(sum, masses[1].inverse_mass);

@@ -9,7 +9,7 @@ mod vector;
 
 use std::collections::{BTreeSet, HashMap};
 
-pub use vector::Vec3;
+pub use vector::{Symmetric, Vec3};
 
 /// Number of a node in its graph. Operands of a node have smaller numbers than the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -294,6 +294,11 @@ impl Graph {
     /// An input of four values.
     pub fn input4(&mut self, source: Source, name: &str) -> [Operand; 4] {
         self.input_port(source, name, ["_x", "_y", "_z", "_w"])
+    }
+
+    /// An input of a symmetric matrix: xx, yy, zz, xy, xz, yz.
+    pub fn input_symmetric(&mut self, source: Source, name: &str) -> Symmetric {
+        Symmetric(self.input_port(source, name, ["_xx", "_yy", "_zz", "_xy", "_xz", "_yz"]))
     }
 
     fn input_port<const N: usize>(

@@ -153,16 +153,20 @@ fn round_up(cycle: i32, interval: i32) -> i32 {
 mod tests {
     use super::*;
     use crate::equations::{self, WarmStart};
+    use pgs_interface::profile::Inertia;
 
-    fn all() -> [(Graph, u32); 6] {
-        [
-            (equations::contact(4, WarmStart::Built), 2),
-            (equations::friction(WarmStart::Built), 2),
-            (equations::contact(4, WarmStart::LeftOut), 2),
-            (equations::friction(WarmStart::LeftOut), 2),
+    fn all() -> Vec<(Graph, u32)> {
+        let mut all = vec![
             (equations::integration(), 1),
-            (equations::contact(4, WarmStart::Built), 3),
-        ]
+            (equations::contact(4, Inertia::Isotropic, WarmStart::Built), 3),
+        ];
+        for inertia in [Inertia::Isotropic, Inertia::World] {
+            for warm_start in [WarmStart::Built, WarmStart::LeftOut] {
+                all.push((equations::contact(4, inertia, warm_start), 2));
+                all.push((equations::friction(inertia, warm_start), 2));
+            }
+        }
+        all
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The options that describe a build of the accelerator.
 
 use clap::{Args, ValueEnum};
+use pgs_interface::profile::Inertia;
 use rtlgen::design::{Design, OddReadLatency, Parameters};
 use rtlgen::equations::WarmStart;
 
@@ -22,6 +23,15 @@ enum SmallestNormal {
     Dropped,
 }
 
+/// The form of the bodies' inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum InertiaForm {
+    /// Equal about every axis.
+    Isotropic,
+    /// Any, streamed with every body, with its mass.
+    World,
+}
+
 /// An extension of the interface that a build need not have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Extension {
@@ -33,14 +43,15 @@ enum Extension {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Build")]
 pub(crate) struct BuildArgs {
-    /// Bodies that the memories hold
-    #[arg(long, value_name = "N", default_value_t = Parameters::default().bodies,
-          value_parser = clap::value_parser!(u32).range(2..=131_072))]
-    bodies: u32,
-    /// Collisions that the memories hold
-    #[arg(long, value_name = "N", default_value_t = Parameters::default().collisions,
-          value_parser = clap::value_parser!(u32).range(2..=524_288))]
-    collisions: u32,
+    /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every body
+    #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
+    inertia: InertiaForm,
+    /// Bodies that the memories hold [default: 40960; with world inertia 16384]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=131_072))]
+    bodies: Option<u32>,
+    /// Collisions that the memories hold [default: 131072; with world inertia 65536]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=524_288))]
+    collisions: Option<u32>,
     /// On a hazard, wait for the velocity or read the stale one
     #[arg(long, value_enum, default_value_t = Hazards::Interlocked)]
     hazards: Hazards,
@@ -70,9 +81,15 @@ impl BuildArgs {
             true => WarmStart::LeftOut,
             false => WarmStart::Built,
         };
+        let inertia = match self.inertia {
+            InertiaForm::Isotropic => Inertia::Isotropic,
+            InertiaForm::World => Inertia::World,
+        };
+        let default = Parameters::with(inertia);
         let parameters = Parameters {
-            bodies: self.bodies,
-            collisions: self.collisions,
+            bodies: self.bodies.unwrap_or(default.bodies),
+            collisions: self.collisions.unwrap_or(default.collisions),
+            inertia,
             interlocked: self.hazards == Hazards::Interlocked,
             address_stages: self.address_stages,
             output_stages: self.output_stages,
