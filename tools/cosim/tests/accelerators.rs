@@ -160,7 +160,8 @@ fn the_driver_streams_inertias_and_masses_to_an_accelerator_in_another_process()
     let folder = golden("pile5_step60");
     let shapes = (1_u8..=100).map(|n| {
         let size = f32::from(n);
-        Shape { inverse_mass: 1.0 / size, inverse_inertia: [6.0 / size, 3.0 / size, 2.0 / size] }
+        let inverse_inertia = [6.0, 3.0, 2.0].map(|k: f32| k / size);
+        Shape { inverse_inertia, ..Shape::isotropic(1.0 / size, 0.0) }
     });
     let shapes: Vec<Shape> = [Shape::STATIC].into_iter().chain(shapes).collect();
     let mut before = folder.bodies.clone();
