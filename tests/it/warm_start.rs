@@ -185,7 +185,8 @@ fn a_warm_start_costs_a_pass_of_each_kind() {
         let hot = step(&ordered(Order::AsGiven).with_warm_start(true));
         assert_eq!((cold.passes, hot.passes), (8, 10));
         let count = collisions.len() as u64;
-        let fills = u64::from(profile.contact.fill + profile.friction.fill);
+        let variant = config.variant();
+        let fills = u64::from(variant.contact().fill + variant.friction().fill);
         assert_eq!(hot.cycles.work, cold.cycles.work + 2 * count * interval + fills);
         // Eight beats a collision in each of the two passes.
         assert_eq!(hot.bytes_to_device, cold.bytes_to_device + 2 * 16 * 8 * count);
