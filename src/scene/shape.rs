@@ -38,17 +38,19 @@ pub struct Shape {
     /// Diagonal of the inverse inertia about the body's axes, 1/(kg m²). Unless the three are equal
     /// the shape needs a bitstream with world inertia.
     pub inverse_inertia: [f32; 3],
-    /// Friction of the shape. It counts in steps with
+    /// Friction of the shape, 0 to [`FRICTION_MAX`](Self::FRICTION_MAX). It counts in steps with
     /// [`StepParameters::shape_friction`](crate::StepParameters::shape_friction) alone.
     pub friction: f32,
 }
 
 impl Shape {
+    /// The largest friction of a shape: the product of two of them stays within binary16.
+    pub const FRICTION_MAX: f32 = 255.0;
     /// A shape that never moves.
     pub const STATIC: Self = Self::isotropic(0.0, 0.0);
 
-    /// A shape whose inertia is the same about every axis (cube, sphere). As of every constructor, its friction
-    /// is 1.
+    /// A shape whose inertia is the same about every axis (cube, sphere). Its friction is 1, as every
+    /// constructor sets it.
     #[must_use]
     pub const fn isotropic(inverse_mass: f32, inverse_inertia: f32) -> Self {
         Self { inverse_mass, inverse_inertia: [inverse_inertia; 3], friction: 1.0 }

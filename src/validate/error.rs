@@ -337,7 +337,19 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// An inverse mass, an inertia or a friction is negative, subnormal or not finite.
+    /// The friction of a shape is negative, no number, or so large that a product of two leaves binary16.
+    #[error(
+        "shape {shape}: its friction is {found}, expected 0 to {most}: correct it",
+        most = crate::Shape::FRICTION_MAX
+    )]
+    ShapeFriction {
+        /// The shape.
+        shape: usize,
+        /// Its friction.
+        found: f32,
+    },
+
+    /// An inverse mass or inertia is negative, subnormal or not finite.
     #[error(
         "shape {shape}: its {field}[{component}] is {found:e}, expected 0 or a finite number of at \
          least {limit:e}: correct it",

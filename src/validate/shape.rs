@@ -9,7 +9,6 @@ use crate::scene::Shape;
 
 const MASS: &str = "inverse mass";
 const INERTIA: &str = "inverse inertia";
-const FRICTION: &str = "friction";
 
 /// Checks a shape table before any scene uses it.
 pub(crate) fn validate_shapes(shapes: &[Shape], limits: &Limits) -> Result<(), InputError> {
@@ -39,16 +38,9 @@ pub(crate) fn check_shapes(
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
         let [x, y, z] = shape.inverse_inertia;
-        let fields = [
-            (MASS, 0, shape.inverse_mass),
-            (INERTIA, 0, x),
-            (INERTIA, 1, y),
-            (INERTIA, 2, z),
-            (FRICTION, 0, shape.friction),
-        ];
-        // A friction is not streamed, and a bitstream without frictions ignores it.
-        let fields = &fields[..if limits.extensions.shape_friction { 5 } else { 4 }];
-        for (field, component, found) in fields.iter().copied() {
+        let fields =
+            [(MASS, 0, shape.inverse_mass), (INERTIA, 0, x), (INERTIA, 1, y), (INERTIA, 2, z)];
+        for (field, component, found) in fields {
             if !usable(found) {
                 return Err(InputError::ShapeValue { shape: index, field, component, found });
             }
@@ -56,6 +48,11 @@ pub(crate) fn check_shapes(
         if let (true, Some(found)) = (shape.is_static(), [x, y, z].into_iter().find(|k| *k != 0.0))
         {
             return Err(InputError::StaticShapeRotates { shape: index, found });
+        }
+        // A bitstream without frictions of shapes ignores them.
+        let friction = shape.friction;
+        if limits.extensions.shape_friction && !(0.0..=Shape::FRICTION_MAX).contains(&friction) {
+            return Err(InputError::ShapeFriction { shape: index, found: friction });
         }
         if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
             let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
@@ -70,7 +67,7 @@ pub(crate) fn check_shapes(
             };
             (!fits).then_some(format)
         };
-        for (field, component, found) in fields.iter().copied() {
+        for (field, component, found) in fields {
             if let Some(format) = beyond(field, found, &limits.variant) {
                 let (item, largest) = (InputItem::Shape(index), format.largest());
                 let number =
@@ -246,14 +243,14 @@ mod tests {
         let shape = |friction| Shape::isotropic(1.0, 1.5).with_friction(friction);
         assert_eq!(validated(&[shape(f32::NAN)]), Ok(()));
         let with_frictions = Limits { extensions: Extensions::ALL, ..HALF };
-        for found in [-0.5, f32::NAN, f32::INFINITY] {
+        for found in [-0.5, f32::NAN, f32::INFINITY, 255.5] {
             assert!(matches!(
                 validate_shapes(&[shape(found)], &with_frictions),
-                Err(InputError::ShapeValue { shape: 0, field: "friction", .. })
+                Err(InputError::ShapeFriction { shape: 0, .. })
             ));
         }
-        assert_eq!(validate_shapes(&[shape(0.0), shape(0.7)], &with_frictions), Ok(()));
-        assert!(out_of_range(shape(7e4), &with_frictions).contains("friction[0] is 7e4"));
+        let good = [0.0, 0.7, Shape::FRICTION_MAX].map(shape);
+        assert_eq!(validate_shapes(&good, &with_frictions), Ok(()));
     }
 
     #[test]

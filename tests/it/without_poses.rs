@@ -94,12 +94,12 @@ fn a_step_that_integrates_nothing_moves_half_the_beats_of_the_bodies() {
 }
 
 #[test]
-fn every_other_extension_works_without_poses() {
+fn other_extensions_work_without_poses() {
     let (mut bodies, collisions) = scene(5);
     // A static body that moves.
     bodies[0].velocity.linear = [0.5, 0.0, 0.0];
-    let parameters =
-        ordered(Order::AsGiven).with_integrate(false).with_kinematic(true).with_impulses_out(true);
+    let solved = ordered(Order::AsGiven).with_integrate(false).with_spin_damping(0.25);
+    let parameters = solved.with_kinematic(true).with_impulses_out(true);
     // More shapes than the table holds.
     let many: Vec<Shape> = shapes().into_iter().cycle().take(100).collect();
     for shapes in [shapes().to_vec(), many] {
@@ -110,6 +110,14 @@ fn every_other_extension_works_without_poses() {
             assert_eq!(found, expected, "{}", profile.name);
             assert_eq!(old.bytes_from_device - new.bytes_from_device, 32 * bodies.len() as u64);
         }
+    }
+    let frictions: Vec<Shape> = isotropic().into_iter().map(|it| it.with_friction(0.5)).collect();
+    for profile in [&HALF, &MIXED] {
+        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let scene = (bodies.clone(), collisions.clone());
+        let parameters = solved.with_shape_friction(true);
+        let [(found, _), (expected, _)] = on_both(config, &frictions, &scene, &parameters);
+        assert_eq!(found, expected, "{}", profile.name);
     }
 }
 

@@ -106,6 +106,6 @@ attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated --su
 # Impulses of each step come out, and go into the next one.
 attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated --subnormals flush \
 	--accelerator "both:${simulators[0]}"
-# Boxes, capsules and 125 masses, which the bodies bring.
+# Boxes, capsules, cylinders and hulls, with the masses of the shape table.
 attend "$built/pgs" run --scene shapes --grid 5x5x5 --drop 0 --steps 20 --board emulated --subnormals flush \
 	--accelerator "both:$world"

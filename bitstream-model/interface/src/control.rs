@@ -462,9 +462,10 @@ pub const SHAPE_STRIDE: u32 = 16;
 /// Offset in an entry of the inverse mass, 1/kg, f32; 0 is static.
 pub const SHAPE_INVERSE_MASS: u32 = 0x0;
 /// Offset in an entry of the isotropic inverse inertia, 1/(kg m²), f32; without meaning to a
-/// bitstream with world inertia. The rest of the entry is reserved and written 0.
+/// bitstream with world inertia.
 pub const SHAPE_INVERSE_INERTIA: u32 = 0x4;
-/// Offset of the friction in an entry, f32. Only in a bitstream with [`features::SHAPE_FRICTION`].
+/// Offset of the friction in an entry, f32. Only in a bitstream with [`features::SHAPE_FRICTION`], else
+/// reserved and written 0. The last word of the entry is reserved and written 0.
 pub const SHAPE_FRICTION: u32 = 0x8;
 
 /// Every register outside the shape table, by offset.

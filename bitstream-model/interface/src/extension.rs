@@ -79,8 +79,8 @@ impl Extensions {
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
     /// Impulses need passes one after the other, and a stripe for their records. A streamed mass needs the
-    /// rows of a world inertia beside it, and an array of numbers for all bodies. Velocities go out alone
-    /// where they are on chip together. The shapes have a friction where the collisions have no room for
+    /// rows of a world inertia beside it, and an array of numbers for all bodies. A step without
+    /// poses needs all velocities on chip at the end of the passes. The shapes have a friction where the collisions have no room for
     /// one, and where static bodies have records: these name their shapes.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {

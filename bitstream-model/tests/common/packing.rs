@@ -250,7 +250,7 @@ pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
     beats_of_results(variant, bodies, 4)
 }
 
-/// Beats on each stream of results of so many rows.
+/// Beats on each stream of results of `rows` rows.
 pub(crate) fn beats_of_results(variant: &Variant, bodies: usize, rows: usize) -> Vec<usize> {
     let bits = variant.numbers.poses.bits() as usize;
     let all = vec![Beat::default(); bodies * rows * 4 * bits / (8 * BEAT_BYTES)];

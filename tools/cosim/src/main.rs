@@ -400,8 +400,9 @@ fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<boo
         }
         writeln!(out, "the design with {inertia:?} inertia: no difference in {cases} steps")?;
         for mutation in mutations {
-            let mutant =
-                mutation.apply(&files).ok_or("the text of a mutation is not in its file")?;
+            let mutant = mutation.apply(&files).ok_or_else(|| {
+                format!("{}: its text is not in {}", mutation.name, mutation.file)
+            })?;
             let found = difference_of(&mutant, form, cases)?;
             let by = found.as_deref().unwrap_or("NOT FOUND");
             writeln!(out, "{}: {by}", mutation.name)?;

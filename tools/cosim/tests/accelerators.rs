@@ -152,7 +152,7 @@ fn the_driver_steps_warm_on_an_accelerator_in_another_process() {
     assert_eq!(ends[0], ends[1]);
 }
 
-/// More shapes than the table has, none with a number for its inertia: the masses are streamed.
+/// More shapes than the table has, each with another inertia about each axis: the masses are streamed.
 #[test]
 fn the_driver_streams_inertias_and_masses_to_an_accelerator_in_another_process() {
     let files = tempfile::tempdir().expect("a folder");

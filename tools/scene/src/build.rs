@@ -198,11 +198,12 @@ impl Scene {
     /// bounding boxes are at most 2.1 cm apart along each axis. The lower index comes first, the
     /// list is sorted, and the ground has no part in it.
     pub fn pairs(&self) -> impl Iterator<Item = (u32, u32)> {
-        self.detector.pairs()
+        standard(|| self.detector.pairs().collect::<Vec<_>>()).into_iter()
     }
 
     /// All contact points of two bodies, on the surface of `b`: [`detect`](Self::detect) chooses
-    /// up to four of them. None if the pair is none of its kind: the ground, body 0, can only be `a`.
+    /// up to four of them; with the ground the chosen ones. `None` if the narrow phase never asks for this pair:
+    /// the ground, body 0, can only be `a`.
     #[must_use]
     pub fn all_points(&self, a: u32, b: u32) -> Option<Vec<Contact>> {
         standard(|| detect::all_points(&self.bodies, Geometries(&self.geometries), a, b))

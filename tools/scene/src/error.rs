@@ -1,6 +1,6 @@
 //! The errors of building a scene.
 
-use zynq_pgs::ShapeError;
+use zynq_pgs::{Pose, ShapeError};
 
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,14 +36,19 @@ pub enum SceneError {
     },
     /// Body 0 is not the ground.
     #[error(
-        "expected body 0 to be the ground, level and with its centre at [0.0, -400.0, 0.0], found {}",
-        found.map_or_else(|| "no bodies".to_owned(), |found| format!("a body at {found:?}"))
+        "expected body 0 to be the ground, with its centre at [0.0, {:?}, 0.0] and the orientation [0.0, 0.0, 0.0, 1.0], \
+         found {}",
+        -crate::GROUND_HALF_EXTENT,
+        found.map_or_else(
+            || "no bodies".to_owned(),
+            |Pose { position, orientation }| format!("a body at {position:?}, turned by {orientation:?}")
+        )
     )]
     Ground {
-        /// Its position, m; none without bodies.
-        found: Option<[f32; 3]>,
+        /// Its pose; none without bodies.
+        found: Option<Pose>,
     },
-    /// A body is nowhere, or turned in no way.
+    /// A position is not finite, or an orientation has not the length 1.
     #[error("body {body}: expected {what}, found {found:?}")]
     Pose {
         /// Index of the body.

@@ -6,6 +6,7 @@
 
 use std::time::Duration;
 
+use pgs_support::float_env::standard;
 use zynq_pgs::Pose;
 
 /// Tells how many steps are due, and how far between two steps a picture is.
@@ -50,6 +51,10 @@ impl StepClock {
 /// normalised. `fraction` is 0 before the step and 1 after it; other values are moved there.
 #[must_use]
 pub fn interpolate(before: &Pose, after: &Pose, fraction: f32) -> Pose {
+    standard(|| between(before, after, fraction))
+}
+
+fn between(before: &Pose, after: &Pose, fraction: f32) -> Pose {
     let fraction = if fraction > 0.0 { fraction.min(1.0) } else { 0.0 };
     let rest = 1.0 - fraction;
     let [q, r] = [before.orientation, after.orientation];

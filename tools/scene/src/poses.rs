@@ -28,14 +28,14 @@ impl Scene {
         check_poses(bodies)?;
         let expected = at_rest([0.0, -GROUND_HALF_EXTENT, 0.0], STATIC_SHAPE).pose;
         if ground.pose != expected {
-            return Err(SceneError::Ground { found: Some(ground.pose.position) });
+            return Err(SceneError::Ground { found: Some(ground.pose) });
         }
         let cubes = cubes.iter().map(|body| Body { shape: CUBE_SHAPE, ..*body }).collect();
         Ok(Self::on_ground(&[cube(Inertia::default())], cubes))
     }
 }
 
-/// Refuses poses in which nothing can touch.
+/// Refuses positions that are not finite and orientations that are no unit quaternions.
 fn check_poses(bodies: &[Body]) -> Result<(), SceneError> {
     for (body, Body { pose, .. }) in bodies.iter().enumerate() {
         let refused =

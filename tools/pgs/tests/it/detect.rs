@@ -19,7 +19,7 @@ fn assert_agrees(folder: &std::path::Path) -> Value {
     let comparison = &document["comparison"];
     assert_eq!(document["one_list"], true, "{document}");
     assert_eq!(comparison["agrees"], true, "{document}");
-    // Stricter than the verb: Bullet lacks none of ours that touch, and has none more.
+    // Stricter than the verb: we miss none of Bullet's collisions, and none of our extra ones is deep.
     assert_eq!(comparison["missing"]["collisions"], 0, "{document}");
     assert_eq!(comparison["extra"]["deep"], 0, "{document}");
     for kind in ["normals_degrees", "points_m"] {

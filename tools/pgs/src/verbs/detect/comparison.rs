@@ -51,7 +51,7 @@ impl Tally {
         }
     }
 
-    /// The mean difference; 0 if there are none.
+    /// The mean difference; 0 without differences.
     pub(super) fn mean(&self) -> f64 {
         self.sum / (self.count as f64).max(1.0)
     }

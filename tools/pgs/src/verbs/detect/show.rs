@@ -154,8 +154,9 @@ fn print_comparison(comparison: &Comparison, out: &mut dyn Write) -> io::Result<
     let one_sided = |side: &OneSided| {
         let deepest = side.deepest.map(|(distance, pair)| {
             let size = number(distance.abs() * 1e3);
-            let word = if distance < 0.0 { "deep" } else { "apart" };
-            format!("; the deepest is {size} mm {word}: {}", pair_text(pair))
+            let words = if distance < 0.0 { ["deepest", "deep"] } else { ["nearest", "apart"] };
+            let [which, word] = words;
+            format!("; the {which} is {size} mm {word}: {}", pair_text(pair))
         });
         format!(
             "{}, {} of them deeper than 1 mm{}",
