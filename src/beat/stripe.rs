@@ -25,7 +25,7 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, collision, pose, result, velocity_result};
+use pgs_interface::record::{LANES, pose, result, velocity_result};
 use pgs_interface::stripe::Stripe;
 
 /// The records that a segment carries.
@@ -73,7 +73,7 @@ impl Segment {
             Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.velocities),
             Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
             Self::WarmCollisions => match stripes.warm_collisions {
-                Some(stripe) => (collision::WARM_ROWS, numbers.collisions, stripe),
+                Some(stripe) => (variant.warm_collision_rows(), numbers.collisions, stripe),
                 // No step of this design has such a pass.
                 None => (variant.collision_rows(), numbers.collisions, stripes.collisions),
             },
@@ -88,8 +88,7 @@ impl Segment {
 impl Layout {
     /// Rows that fit in a beat.
     pub(crate) const fn rows_per_beat(&self) -> usize {
-        // A row of four 32-bit words is a beat.
-        (u32::BITS / self.format.bits()) as usize
+        self.format.rows_per_beat()
     }
 
     /// Beats of `records` records on all channels, padding included.
@@ -116,12 +115,6 @@ impl Layout {
         let channel = usize::from(group[at]);
         let slot = beat / group.len() * share(group, channel) + share(&group[..at], channel);
         Place { channel, slot }
-    }
-
-    /// The rows of a record, one a beat, whose beats go to a channel. Every record is a whole group.
-    pub(crate) fn rows_on(&self, channel: usize) -> impl Iterator<Item = usize> + use<> {
-        let streams = self.stripe.streams.iter().cycle().take(self.rows).enumerate();
-        streams.filter(move |(_, stream)| usize::from(**stream) == channel).map(|(row, _)| row)
     }
 
     /// The beat of the segment that goes to a place of one of its channels.

@@ -72,7 +72,8 @@ impl Extensions {
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
-    /// Impulses need passes one after the other, and a stripe for their records. A streamed mass needs the
+    /// Impulses need passes one after the other, a stripe for their records, and a zero, with which a
+    /// collision begins that has none. A streamed mass needs the
     /// rows of a world inertia beside it, and an array of numbers for all bodies. Velocities go out alone
     /// where they are on chip together.
     #[must_use]
@@ -86,7 +87,7 @@ impl Extensions {
                 && !matches!(numbers.bodies, StreamFormat::Thesis16),
             pair_friction: absolute && matches!(numbers.collisions, StreamFormat::F32),
             warm_start: profile.stripes.warm_collisions.is_some()
-                && matches!(numbers.collisions, StreamFormat::F32),
+                && !matches!(numbers.collisions, StreamFormat::Thesis16),
             streamed_masses: matches!(inertia, Inertia::World)
                 && matches!(profile.flow, Flow::Passes)
                 && matches!(numbers.bodies, StreamFormat::F32),

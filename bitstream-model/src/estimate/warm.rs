@@ -4,7 +4,7 @@ use super::cycles::{StepCycles, StepShape};
 use super::traffic::{Records, StepTraffic, Transfer};
 use pgs_interface::extension::Extensions;
 use pgs_interface::profile::{Depth, Variant};
-use pgs_interface::record::{BEAT_BYTES, collision};
+use pgs_interface::record::BEAT_BYTES;
 
 /// The way in which a step applies the impulses that it begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ impl WarmCost {
         }
         let records = |count| {
             let format = variant.numbers.collisions;
-            let (together, rows) = (profile.collisions_per_issue, collision::WARM_ROWS);
+            let (together, rows) = (profile.collisions_per_issue, variant.warm_collision_rows());
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let kinds = [
@@ -65,7 +65,9 @@ impl WarmCost {
                 }
                 WarmStart::FirstPass => {
                     let longer = interval.saturating_sub(profile.initiation_interval.into());
-                    (issues.saturating_mul(longer), impulses)
+                    let usual = traffic.collisions.bytes;
+                    let longer_records = records(step.collisions).bytes.saturating_sub(usual);
+                    (issues.saturating_mul(longer), longer_records)
                 }
             };
             more_cycles = more_cycles.saturating_add(cycles);
