@@ -168,7 +168,7 @@ const _: () = assert!(LANES * 4 == pgs_interface::record::BEAT_BYTES);
 
 #[cfg(test)]
 mod tests {
-    use super::Segment::{Collisions, Poses, Results, Velocities};
+    use super::Segment::{Collisions, Poses, Results, Velocities, WarmCollisions};
     use super::*;
     use pgs_interface::address_map::DMA_COUNT_MAX;
     use pgs_interface::profile::{
@@ -176,7 +176,7 @@ mod tests {
     };
     use proptest::prelude::*;
 
-    const SEGMENTS: [Segment; 4] = [Velocities, Collisions, Poses, Results];
+    const SEGMENTS: [Segment; 5] = [Velocities, Collisions, WarmCollisions, Poses, Results];
 
     fn counts<const N: usize>(
         profile: &'static Profile,
@@ -216,6 +216,15 @@ mod tests {
         assert_eq!(counts(&MIXED, Results, 1), [2, 1, 1]);
         assert_eq!(counts(&NAIVE, Collisions, 3), [21]);
         assert_eq!(counts(&NAIVE, Poses, 3), [6]);
+    }
+
+    /// No other channel has more beats than in the other passes.
+    #[test]
+    fn impulses_add_a_beat_of_an_issue_to_the_last_channel() {
+        assert_eq!(counts(&NAIVE, WarmCollisions, 5), [40]);
+        assert_eq!(counts(&FLOAT, WarmCollisions, 5), [10; 4]);
+        assert_eq!(counts(&HALF, WarmCollisions, 5), [9, 9, 6]);
+        assert_eq!(counts(&MIXED, WarmCollisions, 5), [5, 5, 10]);
     }
 
     #[test]

@@ -280,6 +280,33 @@ mod tests {
             "{text}"
         );
     }
+
+    #[test]
+    fn impulses_are_held_against_the_narrowest_place_on_their_way() {
+        let of = |profile: &'static Profile, impulses: &Impulses| {
+            check_impulses(7, impulses, &scene_on(&profile.default_variant(), false))
+        };
+        let beyond = 65_504.0_f32.next_up();
+        for profile in [&HALF, &MIXED] {
+            let edge = Impulses { normal: [0.0, -65_504.0, 0.0, 0.0], friction: [65_504.0; 2] };
+            assert_eq!(of(profile, &edge), Ok(()));
+            let far = Impulses { normal: [0.0, 0.0, 0.0, -beyond], ..edge };
+            let refused = of(profile, &far).expect_err("beyond");
+            let (item, field) = (InputItem::Collision(7, None), "normal impulse");
+            let (format, component) = (StreamFormat::Binary16, 3);
+            let (found, smallest, largest) = (-beyond, 0.0, 65_504.0);
+            let expected = OutOfRange { item, field, component, found, format, smallest, largest };
+            assert_eq!(refused.out_of_range(), Some(expected));
+            assert!(refused.to_string().ends_with("(profiles that could: naive, float)"));
+            assert_eq!(of(&FLOAT, &far), Ok(()));
+            let no_number = Impulses { friction: [f32::NAN, beyond], ..far };
+            let not_finite = InputError::ImpulseNotFinite { collision: 7 };
+            assert_eq!(of(profile, &no_number), Err(not_finite));
+        }
+        let numbers = Numbers { impulses: Precision::Binary16, ..Numbers::F32 };
+        assert_eq!([largest_impulse(&numbers), largest_impulse(&Numbers::F32)], [65_504.0, f32::MAX]);
+    }
+
     #[test]
     fn the_narrowest_place_on_the_way_decides() {
         use StreamFormat::{Binary16, F32, Thesis16};
