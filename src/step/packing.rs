@@ -88,7 +88,8 @@ impl Device {
         seen.good &= bodies_passed;
         let warm = warm.map(|(channel, segments)| {
             let entries = (of_entries.collisions, of_entries.count);
-            let warm = pack_warm(&plan.variant, channel, self.ends.ends(), entries, segments, packers);
+            let warm =
+                pack_warm(&plan.variant, channel, self.ends.ends(), entries, segments, packers);
             // The caller's collisions must answer as they did when they were screened.
             seen.good &= !warm.broken && warm.records == collisions;
             warm

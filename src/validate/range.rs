@@ -304,7 +304,10 @@ mod tests {
             assert_eq!(of(profile, &no_number), Err(not_finite));
         }
         let numbers = Numbers { impulses: Precision::Binary16, ..Numbers::F32 };
-        assert_eq!([largest_impulse(&numbers), largest_impulse(&Numbers::F32)], [65_504.0, f32::MAX]);
+        assert_eq!(
+            [largest_impulse(&numbers), largest_impulse(&Numbers::F32)],
+            [65_504.0, f32::MAX]
+        );
     }
 
     #[test]

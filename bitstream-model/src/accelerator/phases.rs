@@ -60,7 +60,9 @@ impl Accelerator {
     pub(super) fn collisions_in(&self, pass: u32) -> Segment {
         let profile = self.variant.profile;
         let (stripe, rows) = match profile.stripes.warm_collisions {
-            Some(warm) if self.arguments.is_warm(pass) => (warm, self.variant.warm_collision_rows()),
+            Some(warm) if self.arguments.is_warm(pass) => {
+                (warm, self.variant.warm_collision_rows())
+            }
             _ => (profile.stripes.collisions, self.variant.collision_rows()),
         };
         let striping = Striping::new(&stripe, profile.mm2s_widths);

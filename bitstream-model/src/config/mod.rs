@@ -407,8 +407,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
                 // Beyond it both go on as they began.
                 let beats = issue_beats.min(GROUP_MAX * GROUP_MAX);
                 let begin = |of: Stripe| of.streams.iter().cycle().take(beats);
-                !stripe(&warm, profile.mm2s_widths)
-                    || !begin(warm).eq(begin(stripes.collisions))
+                !stripe(&warm, profile.mm2s_widths) || !begin(warm).eq(begin(stripes.collisions))
             }),
             "a warm stripe that begins as the stripe of the collisions is expected",
         ),

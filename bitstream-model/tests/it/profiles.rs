@@ -495,8 +495,7 @@ fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
     static NO_COLLISION: Profile = Profile { collisions_per_issue: 0, ..FLOAT };
     // An issue of many collisions has other beats than a warm pass of `float` begins with.
     const COLD: Stripes = Stripes { warm_collisions: None, ..FLOAT.stripes };
-    static COLLISIONS: Profile =
-        Profile { collisions_per_issue: u32::MAX, stripes: COLD, ..FLOAT };
+    static COLLISIONS: Profile = Profile { collisions_per_issue: u32::MAX, stripes: COLD, ..FLOAT };
     for (profile, expected) in [
         (&NO_COPY, "copies of the velocities is 0, expected 1 to 16"),
         (&COPIES, "copies of the velocities is 17, expected 1 to 16"),
@@ -510,12 +509,8 @@ fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
         assert!(text.contains(expected), "{text}");
     }
     // Sixteen collisions of seven beats need a FIFO of 112.
-    static SIXTEEN: Profile = Profile {
-        collisions_per_issue: 16,
-        shape_capacity: 192,
-        stripes: COLD,
-        ..FLOAT
-    };
+    static SIXTEEN: Profile =
+        Profile { collisions_per_issue: 16, shape_capacity: 192, stripes: COLD, ..FLOAT };
     let with = |fifo_beats| {
         let delays = Delays { fifo_beats, ..Delays::default() };
         BoardConfig { delays, ..config(&SIXTEEN) }

@@ -215,7 +215,8 @@ impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
                 }
                 let mut behind = Made::<V, F>::new(vectors);
                 for nth in of_issue.clone() {
-                    let words = impulses.get(nth).map_or([0; LANES], |all| of(all).map(f32::to_bits));
+                    let words =
+                        impulses.get(nth).map_or([0; LANES], |all| of(all).map(f32::to_bits));
                     behind.row(Row { numbers: Lanes::new(words), integer: None });
                     behind.zeros(issue.rows - ROWS - 1);
                 }
