@@ -25,7 +25,7 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, collision, pose, result, velocity_result};
+use pgs_interface::record::{LANES, pose, result, velocity_result};
 use pgs_interface::stripe::Stripe;
 
 /// The records that a segment carries.
@@ -73,7 +73,7 @@ impl Segment {
             Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.velocities),
             Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
             Self::WarmCollisions => match stripes.warm_collisions {
-                Some(stripe) => (collision::WARM_ROWS, numbers.collisions, stripe),
+                Some(stripe) => (variant.warm_collision_rows(), numbers.collisions, stripe),
                 // No step of this design has such a pass.
                 None => (variant.collision_rows(), numbers.collisions, stripes.collisions),
             },
@@ -88,8 +88,7 @@ impl Segment {
 impl Layout {
     /// Rows that fit in a beat.
     pub(crate) const fn rows_per_beat(&self) -> usize {
-        // A row of four 32-bit words is a beat.
-        (u32::BITS / self.format.bits()) as usize
+        self.format.rows_per_beat()
     }
 
     /// Beats of `records` records on all channels, padding included.
@@ -116,12 +115,6 @@ impl Layout {
         let channel = usize::from(group[at]);
         let slot = beat / group.len() * share(group, channel) + share(&group[..at], channel);
         Place { channel, slot }
-    }
-
-    /// The rows of a record, one a beat, whose beats go to a channel. Every record is a whole group.
-    pub(crate) fn rows_on(&self, channel: usize) -> impl Iterator<Item = usize> + use<> {
-        let streams = self.stripe.streams.iter().cycle().take(self.rows).enumerate();
-        streams.filter(move |(_, stream)| usize::from(**stream) == channel).map(|(row, _)| row)
     }
 
     /// The beat of the segment that goes to a place of one of its channels.
@@ -175,7 +168,7 @@ const _: () = assert!(LANES * 4 == pgs_interface::record::BEAT_BYTES);
 
 #[cfg(test)]
 mod tests {
-    use super::Segment::{Collisions, Poses, Results, Velocities};
+    use super::Segment::{Collisions, Poses, Results, Velocities, WarmCollisions};
     use super::*;
     use pgs_interface::address_map::DMA_COUNT_MAX;
     use pgs_interface::profile::{
@@ -183,7 +176,7 @@ mod tests {
     };
     use proptest::prelude::*;
 
-    const SEGMENTS: [Segment; 4] = [Velocities, Collisions, Poses, Results];
+    const SEGMENTS: [Segment; 5] = [Velocities, Collisions, WarmCollisions, Poses, Results];
 
     fn counts<const N: usize>(
         profile: &'static Profile,
@@ -223,6 +216,15 @@ mod tests {
         assert_eq!(counts(&MIXED, Results, 1), [2, 1, 1]);
         assert_eq!(counts(&NAIVE, Collisions, 3), [21]);
         assert_eq!(counts(&NAIVE, Poses, 3), [6]);
+    }
+
+    /// No other channel has more beats than in the other passes.
+    #[test]
+    fn impulses_add_a_beat_of_an_issue_to_the_last_channel() {
+        assert_eq!(counts(&NAIVE, WarmCollisions, 5), [40]);
+        assert_eq!(counts(&FLOAT, WarmCollisions, 5), [10; 4]);
+        assert_eq!(counts(&HALF, WarmCollisions, 5), [9, 9, 6]);
+        assert_eq!(counts(&MIXED, WarmCollisions, 5), [5, 5, 10]);
     }
 
     #[test]

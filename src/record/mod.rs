@@ -90,6 +90,7 @@ impl<const ROWS: usize> Record<ROWS> {
     }
 
     /// The rows with their integers in place.
+    #[cfg(test)]
     pub(crate) fn whole(self) -> [Lanes; ROWS] {
         std::array::from_fn(|at| Row { numbers: self.rows[at], integer: self.integers[at] }.whole())
     }

@@ -49,8 +49,14 @@ impl Impulses {
     /// Whether all are numbers.
     #[inline]
     pub(crate) fn are_finite(&self) -> bool {
+        self.are_within(f32::MAX)
+    }
+
+    /// Whether all are numbers of at most this magnitude.
+    #[inline]
+    pub(crate) fn are_within(&self, limit: f32) -> bool {
         // Without a branch for each, as nearly all are.
-        let of = |all: bool, impulse: &f32| all & impulse.is_finite();
+        let of = |all: bool, impulse: &f32| all & (impulse.abs() <= limit);
         self.friction.iter().fold(self.normal.iter().fold(true, of), of)
     }
 }

@@ -10,7 +10,6 @@ use crate::beat::pack::collisions::{Entries, Seen, pack_collisions};
 use crate::beat::pack::impulses::{WarmSegments, WarmSums, pack_warm};
 use crate::beat::pack::target::Target;
 use crate::beat::pack::writer::{Writer, Written};
-use crate::beat::stripe::Segment;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
@@ -88,9 +87,9 @@ impl Device {
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
         seen.good &= bodies_passed;
         let warm = warm.map(|(channel, segments)| {
-            let layout = Segment::WarmCollisions.layout(&plan.variant);
             let entries = (of_entries.collisions, of_entries.count);
-            let warm = pack_warm(&layout, channel, self.ends.ends(), entries, segments, packers);
+            let warm =
+                pack_warm(&plan.variant, channel, self.ends.ends(), entries, segments, packers);
             // The caller's collisions must answer as they did when they were screened.
             seen.good &= !warm.broken && warm.records == collisions;
             warm

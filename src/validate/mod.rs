@@ -23,13 +23,14 @@ pub use error::InputError;
 pub use excess::{Excess, InputItem, OutOfRange};
 pub(crate) use look::Look;
 pub(crate) use quick::{Block, Quick};
+pub(crate) use range::largest_impulse;
 pub(crate) use reach::Locations;
 pub(crate) use shape::{needed, validate_shapes};
 
 use self::body::{check_body, shape_of};
 use self::collision::check_collision;
 use self::parameters::check_parameters;
-use self::range::{Held, check_range};
+use self::range::{Held, check_impulses, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
 use crate::control_block::Capabilities;
@@ -131,8 +132,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     for index in 0..scene.needs.collisions {
         let collision = collisions.collision(index);
         check_whole(index, &collision, end, &scene)?;
-        if parameters.warm_start && !collisions.impulses(index).used(&collision).are_finite() {
-            return Err(InputError::ImpulseNotFinite { collision: index });
+        if parameters.warm_start {
+            check_impulses(index, &collisions.impulses(index).used(&collision), &scene)?;
         }
     }
     Ok(())

@@ -1,11 +1,12 @@
 //! Refuses collisions with numbers outside the range that a bitstream keeps from stream to solver.
 
+use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Geometry, Variant};
 
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::record::relative::difference;
-use crate::scene::{CONTACT_POINTS, Collision, Contact};
+use crate::scene::{CONTACT_POINTS, Collision, Contact, Impulses};
 
 /// The narrowest format of each input on its way through stream, arithmetic and array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +17,8 @@ pub(crate) struct Held {
     pub(crate) velocities: StreamFormat,
     /// All numbers of a collision.
     pub(crate) collisions: StreamFormat,
+    /// The impulses that a collision begins with.
+    pub(crate) impulses: StreamFormat,
 }
 
 impl Held {
@@ -26,6 +29,7 @@ impl Held {
             poses: numbers.poses,
             velocities: narrower(narrower(numbers.bodies, numbers.updates), numbers.velocities),
             collisions: narrower(numbers.collisions, numbers.rows),
+            impulses: narrower(narrower(numbers.collisions, numbers.updates), numbers.impulses),
         }
     }
 }
@@ -36,6 +40,38 @@ const fn narrower(stream: StreamFormat, behind: Precision) -> StreamFormat {
         (StreamFormat::F32, Precision::Binary16) => StreamFormat::Binary16,
         (stream, _) => stream,
     }
+}
+
+/// The largest magnitude of an impulse that a collision begins with.
+pub(crate) const fn largest_impulse(numbers: &Numbers) -> f32 {
+    Held::by(numbers).impulses.largest()
+}
+
+/// Checks the impulses that a collision begins with.
+pub(crate) fn check_impulses(
+    index: usize,
+    impulses: &Impulses,
+    scene: &Scene<'_>,
+) -> Result<(), InputError> {
+    if !impulses.are_finite() {
+        return Err(InputError::ImpulseNotFinite { collision: index });
+    }
+    let (format, largest) = (scene.held.impulses, scene.held.impulses.largest());
+    if impulses.are_within(largest) {
+        return Ok(());
+    }
+    let normal = impulses.normal.into_iter().enumerate();
+    let friction = impulses.friction.into_iter().enumerate();
+    let all = normal.map(|of| ("normal impulse", of));
+    let mut all = all.chain(friction.map(|of| ("friction impulse", of)));
+    let beyond = all.find(|(_, (_, found))| found.abs() > largest);
+    let (field, (component, found)) = beyond.unwrap_or(("normal impulse", (0, f32::NAN)));
+    let item = InputItem::Collision(index, None);
+    let number = OutOfRange { item, field, component, found, format, smallest: 0.0, largest };
+    Err(scene.needs.refuse(Excess::OutOfRange(number), |variant| {
+        Extensions::possible(variant).warm_start
+            && impulses.are_within(largest_impulse(&variant.numbers))
+    }))
 }
 
 /// Whether masses and step parameters enter arithmetic of sixteen bits.
@@ -244,11 +280,41 @@ mod tests {
             "{text}"
         );
     }
+
+    #[test]
+    fn impulses_are_held_against_the_narrowest_place_on_their_way() {
+        let of = |profile: &'static Profile, impulses: &Impulses| {
+            check_impulses(7, impulses, &scene_on(&profile.default_variant(), false))
+        };
+        let beyond = 65_504.0_f32.next_up();
+        for profile in [&HALF, &MIXED] {
+            let edge = Impulses { normal: [0.0, -65_504.0, 0.0, 0.0], friction: [65_504.0; 2] };
+            assert_eq!(of(profile, &edge), Ok(()));
+            let far = Impulses { normal: [0.0, 0.0, 0.0, -beyond], ..edge };
+            let refused = of(profile, &far).expect_err("beyond");
+            let (item, field) = (InputItem::Collision(7, None), "normal impulse");
+            let (format, component) = (StreamFormat::Binary16, 3);
+            let (found, smallest, largest) = (-beyond, 0.0, 65_504.0);
+            let expected = OutOfRange { item, field, component, found, format, smallest, largest };
+            assert_eq!(refused.out_of_range(), Some(expected));
+            assert!(refused.to_string().ends_with("(profiles that could: naive, float)"));
+            assert_eq!(of(&FLOAT, &far), Ok(()));
+            let no_number = Impulses { friction: [f32::NAN, beyond], ..far };
+            let not_finite = InputError::ImpulseNotFinite { collision: 7 };
+            assert_eq!(of(profile, &no_number), Err(not_finite));
+        }
+        let numbers = Numbers { impulses: Precision::Binary16, ..Numbers::F32 };
+        assert_eq!(
+            [largest_impulse(&numbers), largest_impulse(&Numbers::F32)],
+            [65_504.0, f32::MAX]
+        );
+    }
+
     #[test]
     fn the_narrowest_place_on_the_way_decides() {
         use StreamFormat::{Binary16, F32, Thesis16};
         let held = |numbers: &Numbers| {
-            let Held { poses, velocities, collisions } = Held::by(numbers);
+            let Held { poses, velocities, collisions, .. } = Held::by(numbers);
             (poses, velocities, collisions)
         };
         assert_eq!(held(&FLOAT.numbers), (F32, F32, F32));

@@ -280,7 +280,12 @@ fn records_have_the_layout_of_the_record_table() {
     assert_eq!((record::collision::BODY_A, record::collision::BODY_B), (1, 2));
     assert_eq!(record::collision::CONTACTS, 3);
     assert_eq!((record::collision::WARM_ROWS, record::collision::IMPULSES), (8, 7));
+    assert_eq!((record::relative::WARM_ROWS, record::relative::IMPULSES), (8, 6));
     assert_eq!(stripe::IMPULSES_STREAM, 0);
+    let warm = |profile: &profile::Profile| profile.stripes.warm_collisions.map(|of| of.streams);
+    assert_eq!(warm(&profile::FLOAT), Some(&[0, 1, 2, 3][..]));
+    assert_eq!(warm(&profile::HALF), Some(&[0, 0, 0, 1, 1, 1, 2, 2][..]));
+    assert_eq!(warm(&profile::MIXED), Some(&[0, 1, 2, 2][..]));
     assert_eq!(record::pose::ROWS, 2);
     assert_eq!((record::pose::POSITION, record::pose::ORIENTATION), (0, 1));
     assert_eq!(record::result::ROWS, 4);

@@ -8,8 +8,10 @@ use crate::common::direct::{direct_step, direct_step_from};
 use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered};
 use bitstream_model::interface::extension::Extensions;
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
 use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan, Hazards};
+use half::f16;
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
 use zynq_pgs::{
     Accelerator, Body, Collision, Collisions, Error, Excess, Fault, Impulses, InputError,
@@ -174,22 +176,25 @@ fn impulses_come_out_of_a_cold_step_too_and_change_nothing() {
 #[test]
 fn a_warm_start_costs_a_pass_of_each_kind() {
     let (bodies, collisions) = scene(5);
-    for (profile, interval) in [(&FLOAT, 2), (&NAIVE, 32)] {
+    let collisions = &collisions[..219];
+    // Cycles and beats of an issue.
+    for (profile, interval, beats) in
+        [(&FLOAT, 2, 8), (&NAIVE, 32, 8), (&HALF, 4, 8), (&MIXED, 2, 4)]
+    {
         let inertia = Inertia::World;
         let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
         let (_board, mut accelerator) = open_with(config, None, &shapes());
         let mut step = |parameters: &StepParameters| {
-            accelerator.step(&mut bodies.clone(), &collisions, parameters).expect("a step")
+            accelerator.step(&mut bodies.clone(), collisions, parameters).expect("a step")
         };
         let cold = step(&ordered(Order::AsGiven));
         let hot = step(&ordered(Order::AsGiven).with_warm_start(true));
         assert_eq!((cold.passes, hot.passes), (8, 10));
-        let count = collisions.len() as u64;
+        let issues = (collisions.len() as u64).div_ceil(profile.collisions_per_issue.into());
         let variant = config.variant();
         let fills = u64::from(variant.contact().fill + variant.friction().fill);
-        assert_eq!(hot.cycles.work, cold.cycles.work + 2 * count * interval + fills);
-        // Eight beats a collision in each of the two passes.
-        assert_eq!(hot.bytes_to_device, cold.bytes_to_device + 2 * 16 * 8 * count);
+        assert_eq!(hot.cycles.work, cold.cycles.work + 2 * issues * interval + fills);
+        assert_eq!(hot.bytes_to_device, cold.bytes_to_device + 2 * 16 * beats * issues);
     }
 }
 
@@ -210,6 +215,142 @@ fn a_collision_without_impulses_begins_with_none() {
         words.into_iter().map(|word| if word == 1 << 31 { 0 } else { word }).collect()
     };
     assert_eq!(zero(bits(&found)), zero(bits(&expected)));
+}
+
+/// The nearest binary16 number.
+fn short(value: f32) -> f32 {
+    f16::from_f32(value).to_f32()
+}
+
+fn short_impulses(of: &Impulses) -> Impulses {
+    Impulses { normal: of.normal.map(short), friction: of.friction.map(short) }
+}
+
+/// The world in numbers of binary16, which also its points are as seen from a body: positions are in
+/// sixty-fourths of a metre.
+fn short_world() -> (Vec<Body>, Vec<Collision>) {
+    let (mut bodies, mut collisions) = world();
+    let on_grid = |value: f32| (value * 64.0).round() / 64.0;
+    for body in &mut bodies {
+        body.pose.position = body.pose.position.map(on_grid);
+        body.pose.orientation = body.pose.orientation.map(short);
+        body.velocity.linear = body.velocity.linear.map(short);
+        body.velocity.angular = body.velocity.angular.map(short);
+    }
+    for collision in &mut collisions {
+        // A third of a sum would be rounded, and otherwise in each of the two.
+        if collision.count == 3 {
+            collision.count = 4;
+        }
+        collision.normal = collision.normal.map(short);
+        for contact in &mut collision.contacts {
+            contact.point = contact.point.map(on_grid);
+            contact.distance = short(contact.distance);
+        }
+    }
+    (bodies, collisions)
+}
+
+/// Impulses go in as binary16 and are f32 from there on.
+#[test]
+fn impulses_of_mixed_are_solved_as_the_direct_solver_does() {
+    let (bodies, collisions) = short_world();
+    assert_eq!(collisions.len() % 2, 1);
+    let parameters = warm(Order::AsGiven).with_integrate(false);
+    for threads in [1, 2] {
+        let (profile, inertia) = (&MIXED, Inertia::World);
+        let config = BoardConfig { profile, inertia, threads, ..BoardConfig::default() };
+        let (board, mut accelerator) = open_with(config, None, &shapes());
+        let (mut found, mut expected) = (bodies.clone(), bodies.clone());
+        let mut given = vec![Impulses::ZERO; collisions.len()];
+        for step in 0..3 {
+            let warm = WarmCollisions { collisions: &collisions, impulses: &given };
+            accelerator.step(&mut found, &warm, &parameters).expect("a step");
+            let rounded: Vec<_> = given.iter().map(short_impulses).collect();
+            let out = direct_step_from(
+                Some(&rounded),
+                &mut expected,
+                &collisions,
+                &shapes(),
+                &parameters,
+            );
+            assert_eq!(bits(&found), bits(&expected), "step {step}");
+            assert_eq!(words(accelerator.impulses()), words(&out), "step {step}");
+            given = out.iter().map(|of| of.scaled(0.85)).collect();
+        }
+        assert!(given.iter().any(|of| short_impulses(of) != *of), "rounding matters");
+        assert_eq!(board.violations(), []);
+    }
+}
+
+/// `float` can compute in binary16 from words of f32: the driver's rounding is then the board's.
+#[test]
+fn impulses_of_half_are_those_of_a_float_board_that_computes_in_binary16() {
+    let (bodies, collisions) = short_world();
+    let inside =
+        Numbers { rows: Precision::Binary16, updates: Precision::Binary16, ..BINARY16_ON_CHIP };
+    let inertia = Inertia::World;
+    let usual = BoardConfig { inertia, ..BoardConfig::default() };
+    let configs = [
+        BoardConfig { profile: &HALF, ..usual },
+        BoardConfig { profile: &FLOAT, numbers: Some(inside), ..usual },
+    ];
+    for count in [collisions.len(), collisions.len() - 1] {
+        let parameters = warm(Order::AsGiven).with_integrate(false);
+        let [half, float] = configs.map(|config| {
+            let (board, mut accelerator) = open_with(config, None, &shapes());
+            let mut found = bodies.clone();
+            let out = three_steps(&mut accelerator, &mut found, &collisions[..count], &parameters);
+            assert_eq!(board.violations(), []);
+            (bits(&found), out)
+        });
+        assert_eq!(half.0, float.0);
+        assert_eq!(words(&half.1), words(&float.1));
+        assert!(half.1.iter().any(|of| short_impulses(of) != *of), "rounding matters");
+    }
+}
+
+const BINARY16_ON_CHIP: Numbers =
+    Numbers { velocities: Precision::Binary16, impulses: Precision::Binary16, ..Numbers::F32 };
+
+#[test]
+fn impulses_beyond_the_words_of_a_collision_are_refused() {
+    let count = scene(5).1.len();
+    for (profile, inertia) in [(&HALF, Inertia::World), (&MIXED, Inertia::World)] {
+        let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+        let mut impulses = vec![Impulses::ZERO; count];
+        impulses[17].friction[1] = -65_505.0;
+        let found = refused(config, &impulses, &warm(Order::AsGiven));
+        let text = found.to_string();
+        assert!(
+            text.starts_with(
+                "collision 17: friction impulse[1] is -65505, but this bitstream holds collisions in \
+                 binary16, which ends at 65504"
+            ),
+            "{text}"
+        );
+        assert!(text.ends_with("world inertia: naive, float)"), "{text}");
+    }
+}
+
+#[test]
+fn an_impulse_in_sixteen_bits_that_is_corrupted_on_its_way_fails_the_step() {
+    let (bodies, collisions) = scene(5);
+    for profile in [&HALF, &MIXED] {
+        let inertia = Inertia::World;
+        let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+        let (board, mut accelerator) = open_with(config, None, &shapes());
+        let plan: FaultPlan =
+            "corrupt=0x00000400@dma2.mm2s,phase=friction1,beat=3".parse().expect("a plan");
+        board.inject(plan);
+        let warm = warm(Order::AsGiven);
+        let error = accelerator.step(&mut bodies.clone(), &collisions, &warm).expect_err("a sum");
+        assert!(
+            matches!(&error, Error::Step { fault, .. } if matches!(**fault, Fault::Checksum { .. })),
+            "{error}"
+        );
+        accelerator.step(&mut bodies.clone(), &collisions, &warm).expect("the next works");
+    }
 }
 
 fn refused(config: BoardConfig, impulses: &[Impulses], parameters: &StepParameters) -> InputError {
@@ -252,8 +393,11 @@ fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
     let inertia = Inertia::World;
     let usual = BoardConfig { inertia, ..BoardConfig::default() };
     let old = BoardConfig { extensions: Extensions::NONE, ..usual };
-    let others = [&HALF, &MIXED, &WINDOWED].map(|profile| BoardConfig { profile, ..usual });
-    for config in others.into_iter().chain([old]) {
+    let windowed = BoardConfig { profile: &WINDOWED, ..usual };
+    // Words without a zero.
+    let thesis = Numbers { collisions: StreamFormat::Thesis16, ..Numbers::BINARY16 };
+    let without_zero = BoardConfig { profile: &HALF, numbers: Some(thesis), ..usual };
+    for config in [windowed, without_zero, old] {
         for (parameters, asked) in [
             (ordered(Order::AsGiven).with_warm_start(true), "a warm start"),
             (ordered(Order::AsGiven).with_impulses_out(true), "the impulses of the collisions"),
@@ -265,7 +409,7 @@ fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
                 "{found}"
             );
             let text = found.to_string();
-            assert!(text.contains("naive") && text.contains("float"), "{text}");
+            assert!(text.contains("naive, float, half, mixed)"), "{text}");
         }
     }
 }

@@ -35,6 +35,13 @@ impl StreamFormat {
         }
     }
 
+    /// Rows of a beat.
+    #[must_use]
+    pub const fn rows_per_beat(self) -> usize {
+        // A row of four 32-bit words is a beat.
+        (u32::BITS / self.bits()) as usize
+    }
+
     /// Largest magnitude that the format carries; a number beyond it must not be sent.
     #[must_use]
     pub const fn largest(self) -> f32 {

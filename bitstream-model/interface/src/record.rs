@@ -3,7 +3,8 @@
 //! A record is rows of four words, (vec3, word); lane 0 is bits 31:0, at the lowest address. In f32
 //! a row is a beat. In sixteen bits a row is half a beat, the first of two in bits 63:0, and the
 //! rows of an array follow each other without a gap: a collision of seven rows takes three beats
-//! and a half.
+//! and a half. In a warm pass the rows of the impulses lie behind all other rows of the collisions that
+//! are issued together.
 //!
 //! ```text
 //!                lane 0   lane 1   lane 2   lane 3
@@ -23,14 +24,17 @@
 //! (relative)  1  r.x      r.y      r.z      bodyB      r = pB - pA
 //!             2  a0.x     a0.y     a0.z     distance0  a = c - pA
 //!             .. 5        up to four contact points; an unused one has distance +infinity
+//!             6  L0       L1       L2       L3         in a warm contact pass only
+//!             6  G0       G1       0        0          in a warm friction pass only
+//!             7  0        0        0        0          in a warm pass only
 //! pose        0  p.x      p.y      p.z      0
 //!             1  q.x      q.y      q.z      q.w
 //! result      0  p.x      p.y      p.z      0
 //!             1  q.x      q.y      q.z      q.w
 //!             2  v.x      v.y      v.z      0
 //!             3  w.x      w.y      w.z      0
-//! impulses    0  L0       L1       L2       L3         after the last contact pass
-//!             0  G0       G1       0        0          after the last friction pass
+//! impulses    0  L0       L1       L2       L3         after the last contact pass, in f32
+//!             0  G0       G1       0        0          after the last friction pass, in f32
 //! ```
 //!
 //! Metres, m/s, rad/s, 1/(kg m²), world frame. `n` is the unit normal from B to A; a contact point
@@ -103,6 +107,10 @@ pub mod collision {
 pub mod relative {
     /// Rows of a record.
     pub const ROWS: usize = 6;
+    /// Rows of a record of a warm pass. The last one is zeros: two rows of sixteen-bit words are a beat.
+    pub const WARM_ROWS: usize = 8;
+    /// In a warm pass, the impulses to begin with: four normal ones, or two of friction and zeros.
+    pub const IMPULSES: usize = 6;
     /// Normal from B to A; the word beside it is the index of body A.
     pub const NORMAL: usize = 0;
     /// Position of body B less that of body A; the word beside it is the index of body B.

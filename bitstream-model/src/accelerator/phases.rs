@@ -18,7 +18,7 @@ use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
-use pgs_interface::record::{CONTACT_POINTS, collision, pose, result, velocity_result};
+use pgs_interface::record::{CONTACT_POINTS, collision, pose, relative, result, velocity_result};
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Collisions of a pass that have arrived, and for how many cycles they may enter.
@@ -60,7 +60,9 @@ impl Accelerator {
     pub(super) fn collisions_in(&self, pass: u32) -> Segment {
         let profile = self.variant.profile;
         let (stripe, rows) = match profile.stripes.warm_collisions {
-            Some(warm) if self.arguments.is_warm(pass) => (warm, collision::WARM_ROWS),
+            Some(warm) if self.arguments.is_warm(pass) => {
+                (warm, self.variant.warm_collision_rows())
+            }
             _ => (profile.stripes.collisions, self.variant.collision_rows()),
         };
         let striping = Striping::new(&stripe, profile.mm2s_widths);
@@ -265,19 +267,24 @@ impl Accelerator {
         let per_issue = profile.collisions_per_issue as usize;
         let warm = self.arguments.is_warm(number);
         let sends = self.arguments.sends_impulses(number);
-        // A longer record may take its streams longer.
-        let of_streams = if warm { segment.cycles_of_one() } else { 0 };
+        // Longer records may take their streams longer.
+        let of_streams = if warm { segment.cycles_of(per_issue) } else { 0 };
         let interval = u64::from(profile.initiation_interval).max(of_streams);
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
+        let mut together = Vec::with_capacity(if warm { per_issue } else { 0 });
         while records < available && cycles <= limit {
             let issue = (available - records).min(per_issue);
             let first = segment.done + records;
-            for index in first..first + issue {
-                let collision = match warm {
-                    true => Collision::warm(&reader.record(), self.arguments.solver.pair_friction),
-                    false => self.collision(&mut reader),
+            if warm {
+                self.warm_issue(&mut reader, &mut together);
+            }
+            for at in 0..issue {
+                let index = first + at;
+                let collision = match together.get(at) {
+                    Some(collision) => *collision,
+                    None => self.collision(&mut reader),
                 };
                 let now = self.clock + cycles;
                 let stall = self.solve::<R, U, I>(number, index, now, &collision)?;
@@ -293,6 +300,30 @@ impl Accelerator {
         let sum = segment.advance(records, inputs);
         self.received(sum);
         Ok(cycles)
+    }
+
+    /// Reads the collisions of the next issue of a warm pass, padding included: their records, and then the
+    /// impulses of each.
+    fn warm_issue(&self, reader: &mut Reader<'_>, together: &mut Vec<Collision>) {
+        let profile = self.variant.profile;
+        let format = self.variant.numbers.collisions;
+        together.clear();
+        together.extend((0..profile.collisions_per_issue).map(|_| self.collision(reader)));
+        for collision in together {
+            let impulses = match profile.geometry {
+                Geometry::Absolute => {
+                    const _: () = assert!(collision::WARM_ROWS == collision::IMPULSES + 1);
+                    let [impulses] = reader.rows();
+                    impulses
+                }
+                Geometry::Relative => {
+                    const _: () = assert!(relative::WARM_ROWS == relative::IMPULSES + 2);
+                    let [impulses, _] = reader.rows();
+                    impulses
+                }
+            };
+            *collision = collision.with_impulses(format, impulses);
+        }
     }
 
     /// Sends the impulses of a collision after the last pass of its kind; zeros for padding.

@@ -15,7 +15,7 @@ use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
-use pgs_interface::record::{BEAT_BYTES, collision};
+use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::Stripe;
 
 /// Upper limit of the beats in a group of a stripe.
@@ -384,6 +384,8 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
             && stripe.streams.iter().all(|stream| usize::from(*stream) < widths.len())
     };
     let stripes = &profile.stripes;
+    let rows = profile.default_variant().collision_rows() * profile.collisions_per_issue as usize;
+    let issue_beats = rows / profile.numbers.collisions.rows_per_beat();
     let wrong = [
         (
             streams.iter().any(|widths| !(1..=DMA_COUNT_MAX).contains(&widths.len())),
@@ -402,11 +404,10 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
         ),
         (
             stripes.warm_collisions.is_some_and(|warm| {
-                let beats = |of: &Stripe, rows: usize| {
-                    of.streams.iter().copied().cycle().take(rows).collect::<Vec<_>>()
-                };
-                !stripe(&warm, profile.mm2s_widths)
-                    || beats(&warm, collision::ROWS) != beats(&stripes.collisions, collision::ROWS)
+                // Beyond it both go on as they began.
+                let beats = issue_beats.min(GROUP_MAX * GROUP_MAX);
+                let begin = |of: Stripe| of.streams.iter().cycle().take(beats);
+                !stripe(&warm, profile.mm2s_widths) || !begin(warm).eq(begin(stripes.collisions))
             }),
             "a warm stripe that begins as the stripe of the collisions is expected",
         ),

@@ -4,7 +4,7 @@ use super::cycles::{StepCycles, StepShape};
 use super::traffic::{Records, StepTraffic, Transfer};
 use pgs_interface::extension::Extensions;
 use pgs_interface::profile::{Depth, Variant};
-use pgs_interface::record::{BEAT_BYTES, collision};
+use pgs_interface::record::BEAT_BYTES;
 
 /// The way in which a step applies the impulses that it begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ impl WarmCost {
         }
         let records = |count| {
             let format = variant.numbers.collisions;
-            let (together, rows) = (profile.collisions_per_issue, collision::WARM_ROWS);
+            let (together, rows) = (profile.collisions_per_issue, variant.warm_collision_rows());
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let kinds = [
@@ -65,7 +65,9 @@ impl WarmCost {
                 }
                 WarmStart::FirstPass => {
                     let longer = interval.saturating_sub(profile.initiation_interval.into());
-                    (issues.saturating_mul(longer), impulses)
+                    let usual = traffic.collisions.bytes;
+                    let longer_records = records(step.collisions).bytes.saturating_sub(usual);
+                    (issues.saturating_mul(longer), longer_records)
                 }
             };
             more_cycles = more_cycles.saturating_add(cycles);
@@ -80,7 +82,7 @@ impl WarmCost {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
+    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
 
     const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
 
@@ -107,12 +109,30 @@ mod tests {
         assert_eq!(first.expect("a warm start").more_cycles, 2 * 4 * 127_000);
     }
 
+    /// Two collisions of `half` are eight beats, two of them on 64 bits; one of `mixed` is four, two of them
+    /// on one stream.
+    #[test]
+    fn impulses_in_sixteen_bits_come_in_a_beat_of_each_issue() {
+        let of = |profile: &'static Profile, way| {
+            let cost = WarmCost::new(&profile.default_variant(), way, &THESIS_STEP);
+            let cost = cost.expect("a warm start");
+            assert_eq!(cost.more_out, 2 * 16 * 127_000, "f32 words");
+            (cost.more_cycles, cost.more_in)
+        };
+        let (own, first) = (WarmStart::OwnPass, WarmStart::FirstPass);
+        assert_eq!(of(&HALF, own), (2 * 4 * 63_500 + 364 + 306, 2 * 8 * 16 * 63_500));
+        assert_eq!(of(&HALF, first), (2 * 63_500, 2 * 16 * 63_500));
+        assert_eq!(of(&MIXED, own), (2 * 2 * 127_000 + 364 + 306, 2 * 4 * 16 * 127_000));
+        assert_eq!(of(&MIXED, first), (2 * 127_000, 2 * 16 * 127_000));
+    }
+
     #[test]
     fn a_step_without_passes_has_no_cost_and_some_designs_have_no_warm_start() {
         let none = StepShape::new(9, 0);
         let cost = WarmCost::new(&FLOAT.default_variant(), WarmStart::OwnPass, &none);
         let cost = cost.expect("a warm start");
         assert_eq!((cost.more_cycles, cost.more_in, cost.more_out), (0, 0, 0));
-        assert_eq!(WarmCost::new(&HALF.default_variant(), WarmStart::OwnPass, &THESIS_STEP), None);
+        let windowed = WINDOWED.default_variant();
+        assert_eq!(WarmCost::new(&windowed, WarmStart::OwnPass, &THESIS_STEP), None);
     }
 }

@@ -154,17 +154,23 @@ impl Step {
         let stripes = &profile.stripes;
         // The collisions with the impulses of a kind, where they have a stripe.
         let with_impulses = |kind: usize| {
-            let impulses = self.impulses.iter().map(|impulses| impulses[kind].map(f32::to_bits));
-            let warm = records
-                .iter()
-                .zip(impulses)
-                .flat_map(|(record, row)| record.iter().copied().chain([row]).collect::<Vec<_>>());
-            let rows: Vec<Row> = warm.collect();
-            let stripe = stripes.warm_collisions.filter(|_| !rows.is_empty());
-            let none = || vec![Vec::new(); streams];
-            stripe.map_or_else(none, |stripe| {
-                deal(&stripe, streams, beats(numbers.collisions, &rows))
-            })
+            let stripe = stripes.warm_collisions.filter(|_| !self.impulses.is_empty());
+            let Some(stripe) = stripe else { return vec![Vec::new(); streams] };
+            let together = profile.collisions_per_issue as usize;
+            let behind = variant.warm_collision_rows() - variant.collision_rows();
+            let mut rows = Vec::new();
+            for (records, impulses) in records.chunks(together).zip(self.impulses.chunks(together))
+            {
+                let padding = together - records.len();
+                rows.extend(records.iter().flatten());
+                rows.extend(vec![[0; 4]; padding * variant.collision_rows()]);
+                for impulses in impulses {
+                    rows.push(impulses[kind].map(|impulse| encode(numbers.collisions, impulse)));
+                    rows.extend(vec![[0; 4]; behind - 1]);
+                }
+                rows.extend(vec![[0; 4]; padding * behind]);
+            }
+            deal(&stripe, streams, beats(numbers.collisions, &rows))
         };
         let segments = [
             deal(&stripes.velocities, streams, beats(numbers.bodies, &velocities)),
@@ -209,15 +215,35 @@ impl Step {
         let issues = collisions.div_ceil(profile.collisions_per_issue.into());
         let pass = issues * u64::from(profile.initiation_interval);
         let depths = [variant.contact(), variant.friction()];
+        let warm = |passes: u32| match passes {
+            0 => 0,
+            _ if self.impulses.is_empty() => 0,
+            _ => issues * warm_interval(variant),
+        };
         let passes: u64 = self
             .iterations
             .into_iter()
             .zip(depths)
-            .map(|(passes, depth)| u64::from(passes) * (pass + u64::from(depth.fill)))
+            .map(|(passes, depth)| {
+                let warm = warm(passes);
+                let fills = u64::from(passes) + u64::from(warm > 0);
+                u64::from(passes) * pass + warm + fills * u64::from(depth.fill)
+            })
             .sum();
         let integration = inputs(2).max(results) + u64::from(profile.integration_fill);
         inputs(0) + if collisions == 0 { 0 } else { passes } + integration
     }
+}
+
+/// Cycles from one issue of a warm pass to the next.
+fn warm_interval(variant: &Variant) -> u64 {
+    let Variant { profile, numbers, .. } = *variant;
+    let rows = profile.collisions_per_issue as usize * variant.warm_collision_rows();
+    let issue = beats(numbers.collisions, &vec![[0; 4]; rows]);
+    let stripe = profile.stripes.warm_collisions.expect("a stripe");
+    let dealt = deal(&stripe, profile.mm2s_widths.len(), issue);
+    let of_streams = slowest(&dealt.iter().map(Vec::len).collect::<Vec<_>>(), profile.mm2s_widths);
+    of_streams.max(profile.initiation_interval.into())
 }
 
 /// Cycles of the slowest stream, with the beats and the width of each.

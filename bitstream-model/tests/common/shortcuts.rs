@@ -45,12 +45,18 @@ static PAIRS: Profile = Profile {
     mm2s_widths: &[64, 128, 32],
     stripes: Stripes {
         collisions: Stripe { streams: &[2, 0, 1, 1, 0, 1, 1], padded: false },
+        warm_collisions: None,
         ..HALF.stripes
     },
     initiation_interval: 2,
     ..HALF
 };
-const RELATIVE: Profile = Profile { numbers: Numbers::F32, ..MIXED };
+/// Its issues have other beats than a warm pass of `mixed` begins with.
+const RELATIVE: Profile = Profile {
+    numbers: Numbers::F32,
+    stripes: Stripes { warm_collisions: None, ..MIXED.stripes },
+    ..MIXED
+};
 
 const fn in_turn(streams: &'static [u8]) -> Stripes {
     let stripe = Stripe { streams, padded: false };
@@ -224,9 +230,9 @@ pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
     step
 }
 
-/// The step with each extension of `float` whose bit is set: a friction for each collision, a warm start,
-/// impulses that go out, a mass of each body, and with two bits no poses. Another design has the last two alone;
-/// a board without the masses ignores them.
+/// The step with each extension whose bit is set: a friction for each collision in `float`, a warm start and
+/// impulses that go out in a design with a warm start, a mass of each body, and with two bits no poses. A
+/// board without the masses ignores them.
 pub(crate) fn extended(mut step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
     let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
     let has = |bit: u8| bits >> bit & 1 == 1;
@@ -241,13 +247,14 @@ pub(crate) fn extended(mut step: Step, bits: u8, seed: u64, profile: &Profile) -
         };
         step.masses = step.bodies.iter().enumerate().map(mass).collect();
     }
-    if *profile != FLOAT {
+    if profile.stripes.warm_collisions.is_none() {
         return step;
     }
+    let has_friction = has(0) && *profile == FLOAT;
     let each = 0..step.collisions.len();
     let impulses = |n| [0, 4].map(|k| [0, 1, 2, 3].map(|at| 0.1 * of(n, k + at)));
     Step {
-        frictions: each.clone().filter(|_| has(0)).map(|n| 0.5 + 0.5 * of(n, 8)).collect(),
+        frictions: each.clone().filter(|_| has_friction).map(|n| 0.5 + 0.5 * of(n, 8)).collect(),
         impulses: each.filter(|_| has(1)).map(impulses).collect(),
         impulses_out: has(2),
         ..step

@@ -339,6 +339,21 @@ fn scene() -> impl Strategy<Value = Step> {
     )
 }
 
+/// The same with a warm start, impulses that go out, and empty collisions among the others.
+fn warm_scene() -> impl Strategy<Value = Step> {
+    let impulses = prop::array::uniform4(-0.3..0.7_f32);
+    let of_collision = (prop::array::uniform2(impulses), 0..5_u32);
+    (scene(), prop::collection::vec(of_collision, 12)).prop_map(|(mut step, given)| {
+        for (collision, (impulses, chance)) in step.collisions.iter_mut().zip(given) {
+            step.impulses.push(impulses);
+            if chance == 0 {
+                collision.count = 0;
+            }
+        }
+        Step { impulses_out: true, ..step }
+    })
+}
+
 /// The step as it reads after having been on the streams; a static body rests in any format.
 fn received(step: &Step, bodies: StreamFormat, collisions: StreamFormat) -> Step {
     let f = carried(collisions);
@@ -359,6 +374,7 @@ fn received(step: &Step, bodies: StreamFormat, collisions: StreamFormat) -> Step
                 ..*collision
             })
             .collect(),
+        impulses: step.impulses.iter().map(|kinds| kinds.map(|of| of.map(&f))).collect(),
         ..step.clone()
     }
 }
@@ -382,7 +398,8 @@ fn relative(step: &Step, format: StreamFormat) -> Step {
             }
         })
         .collect();
-    Step { collisions, ..step.clone() }
+    let impulses = step.impulses.iter().map(|kinds| kinds.map(|of| of.map(&f))).collect();
+    Step { collisions, impulses, ..step.clone() }
 }
 
 proptest! {
@@ -418,6 +435,54 @@ proptest! {
                 prop_assert_eq!(states(&float.bodies), states(&naive.bodies));
                 prop_assert_eq!(float.impulse_sum, naive.impulse_sum);
             }
+        }
+    }
+
+    /// The same with impulses: those of `float` that were on the streams of `half` or `mixed` are solved.
+    #[test]
+    fn impulses_that_come_in_sixteen_bits_are_solved_as_those_of_float(step in warm_scene()) {
+        let words = received(&step, BINARY16, BINARY16);
+        let half = run(config(&HALF, BINARY16_STREAMS), &step);
+        let reference = run(config(&FLOAT, Numbers::F32), &words);
+        let expected: Vec<_> =
+            reference.bodies.iter().map(|body| mapped(body, carried(BINARY16))).collect();
+        prop_assert_eq!(states(&half.bodies), states(&expected));
+        prop_assert_eq!(&half.impulses, &reference.impulses);
+
+        let mixed = run(config(&MIXED, MIXED.numbers), &step);
+        let reference = run(config(&FLOAT, Numbers::F32), &relative(&step, BINARY16));
+        prop_assert_eq!(states(&mixed.bodies), states(&reference.bodies));
+        prop_assert_eq!(&mixed.impulses, &reference.impulses);
+        prop_assert_eq!(mixed.impulse_sum, reference.impulse_sum);
+    }
+
+    /// All of `half` is in binary16; `float` computes so with words of f32. Poses in f32 would be
+    /// integrated in f32.
+    #[test]
+    fn impulses_of_half_are_solved_in_binary16(step in warm_scene()) {
+        let step = Step { integrate: false, ..step };
+        let half = run(config(&HALF, HALF.numbers), &step);
+        let reference = run(config(&FLOAT, BINARY16_INSIDE), &received(&step, BINARY16, BINARY16));
+        let [found, expected] = [&half, &reference].map(|outcome| states(&outcome.bodies));
+        prop_assert_eq!(found, expected);
+        let words = |outcome: &Outcome| -> Vec<u32> {
+            let words = outcome.impulses.iter().flat_map(|beat| beat.0);
+            // A NaN has no sign and no payload in binary16.
+            let plain = |word| if f32::from_bits(word).is_nan() { f32::NAN.to_bits() } else { word };
+            words.map(plain).collect()
+        };
+        prop_assert_eq!(words(&half), words(&reference));
+        prop_assert_eq!(half.impulse_sum, reference.impulse_sum);
+    }
+
+    /// What went out of a step goes into the next one with the same bits, where it is in binary16.
+    #[test]
+    fn impulses_of_half_come_back_as_they_went_out(step in warm_scene()) {
+        let step = Step { iterations: [1, 1], impulses_out: true, ..step };
+        let outcome = run(config(&HALF, HALF.numbers), &step);
+        for impulse in outcome.impulses.iter().flat_map(|beat| beat.0).map(f32::from_bits) {
+            let back = half(impulse);
+            prop_assert!(back.to_bits() == impulse.to_bits() || impulse.is_nan(), "{impulse}");
         }
     }
 }

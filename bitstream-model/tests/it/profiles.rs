@@ -10,7 +10,7 @@ use pgs_interface::profile::{
     FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, OnChipMemory, PROFILES, Profile, Variant,
 };
 use pgs_interface::record::Beat;
-use pgs_interface::stripe::Stripe;
+use pgs_interface::stripe::{Stripe, Stripes};
 
 use crate::common::packing::{Row, beats, result_beats};
 use crate::common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
@@ -156,6 +156,27 @@ fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
                     "{name} {outcome:?}"
                 );
             }
+        }
+    }
+}
+
+/// By hand: eight beats of `half` take its stream of 64 bits four cycles, four of `mixed` a stream two.
+#[test]
+fn an_issue_of_a_warm_pass_takes_the_cycles_of_its_busiest_stream() {
+    for (profile, interval) in [(&NAIVE, 32), (&FLOAT, 2), (&HALF, 4), (&MIXED, 2)] {
+        let variant = profile.default_variant();
+        let work = |step: &Step| {
+            let outcome = unlimited(&variant).step(step).expect("the step completes");
+            outcome.cycles - outcome.stalls - outcome.waits
+        };
+        for collisions in [1_u16, 50, 199] {
+            let cold = Step::on_ground(200, collisions.into());
+            let impulses = vec![[[0.0; 4]; 2]; collisions.into()];
+            let warm = Step { impulses, ..cold.clone() };
+            let issues = u64::from(collisions).div_ceil(profile.collisions_per_issue.into());
+            let fills = u64::from(profile.contact.fill + profile.friction.fill);
+            assert_eq!(work(&warm), work(&cold) + 2 * issues * interval + fills);
+            assert_eq!(work(&warm), warm.cycles(&variant), "{}", profile.name);
         }
     }
 }
@@ -472,7 +493,9 @@ fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
     static NO_SHAPE: Profile = Profile { shape_capacity: 0, ..FLOAT };
     static SHAPES: Profile = Profile { shape_capacity: 193, ..FLOAT };
     static NO_COLLISION: Profile = Profile { collisions_per_issue: 0, ..FLOAT };
-    static COLLISIONS: Profile = Profile { collisions_per_issue: u32::MAX, ..FLOAT };
+    // An issue of many collisions has other beats than a warm pass of `float` begins with.
+    const COLD: Stripes = Stripes { warm_collisions: None, ..FLOAT.stripes };
+    static COLLISIONS: Profile = Profile { collisions_per_issue: u32::MAX, stripes: COLD, ..FLOAT };
     for (profile, expected) in [
         (&NO_COPY, "copies of the velocities is 0, expected 1 to 16"),
         (&COPIES, "copies of the velocities is 17, expected 1 to 16"),
@@ -486,7 +509,8 @@ fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
         assert!(text.contains(expected), "{text}");
     }
     // Sixteen collisions of seven beats need a FIFO of 112.
-    static SIXTEEN: Profile = Profile { collisions_per_issue: 16, shape_capacity: 192, ..FLOAT };
+    static SIXTEEN: Profile =
+        Profile { collisions_per_issue: 16, shape_capacity: 192, stripes: COLD, ..FLOAT };
     let with = |fifo_beats| {
         let delays = Delays { fifo_beats, ..Delays::default() };
         BoardConfig { delays, ..config(&SIXTEEN) }

@@ -1,18 +1,28 @@
 //! Writes the collision segments of the warm passes into the buffer of the channel that carries
-//! impulses: behind the beats that a collision has there in every pass, a beat of its impulses.
+//! impulses: behind the beats that an issue of collisions has there in every pass, a beat of their
+//! impulses.
 //!
 //! The other channels have the same beats in every pass.
 
+use std::marker::PhantomData;
 use std::ops::Range;
+use std::slice::ChunksExactMut;
 
-use pgs_interface::record::{Beat, collision};
+use pgs_interface::profile::{Geometry, Variant};
+use pgs_interface::record::{Beat, LANES};
 
+use super::encode::{Absolute, Encoding, Kind, Relative};
 use super::pool::{PackPool, Stretch as _, ranges};
 use super::stripe_writer::BLOCK;
-use crate::beat::stripe::Layout;
-use crate::record::body_table::{Ends, Lookup as _};
-use crate::record::{self, Counted};
+use crate::beat::format::{Beats, Format, Join, Records as _, in_format};
+use crate::beat::stripe::Segment;
+use crate::record::body_table::{Ends, Lookup};
+use crate::record::sixteen::Sixteen;
+use crate::record::source::Contiguous;
+use crate::record::{Row, Rows};
 use crate::scene::{Collision, Collisions, Impulses};
+use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
+use crate::validate::{Block, largest_impulse};
 
 /// The segments of both warm passes on the channel that carries impulses. A kind without iterations
 /// has no warm pass and an empty segment.
@@ -31,7 +41,7 @@ pub(crate) struct WarmSums {
     pub(crate) friction: u32,
     /// Sum of the words of the collisions' records in any other pass.
     pub(crate) records: u32,
-    /// Whether an impulse was not a number.
+    /// Whether an impulse was not a number, or beyond the range of the bitstream.
     pub(crate) broken: bool,
 }
 
@@ -50,109 +60,205 @@ impl WarmSums {
 /// Writes the collisions of both warm passes. The records of the other passes are written already: the
 /// sum of the words tells whether the caller's collisions are still the same.
 ///
-/// Shape: a segment has `layout.beats_on_channel(collisions.len(), channel)` beats. Collisions are
-/// records in world coordinates and f32, a row a beat.
+/// Shape: a segment has as many beats as the layout of [`Segment::WarmCollisions`] says of the channel.
 pub(crate) fn pack_warm<C: Collisions + ?Sized>(
-    layout: &Layout,
+    variant: &Variant,
     channel: usize,
     ends: Ends<'_>,
     (collisions, count): (&C, usize),
     segments: WarmSegments<'_>,
     packers: &mut PackPool,
 ) -> WarmSums {
-    let rows = ChannelRows::of(layout, channel);
+    let layout = Segment::WarmCollisions.layout(variant);
+    let issue = Issue::of(variant, channel);
     let mut sums = WarmSums::default();
-    let beats = rows.beats();
     let WarmSegments { mut contact, mut friction } = segments;
     let cut = |size| {
+        let beats = layout.beats_on_channel(size, channel);
         ranges(count, size).map(move |range| {
             // A segment without beats stays empty.
-            let (of_contact, behind) = std::mem::take(&mut contact).parted(size * beats);
-            let (of_friction, others) = std::mem::take(&mut friction).parted(size * beats);
+            let (of_contact, behind) = std::mem::take(&mut contact).parted(beats);
+            let (of_friction, others) = std::mem::take(&mut friction).parted(beats);
             (contact, friction) = (behind, others);
             (range, WarmSegments { contact: of_contact, friction: of_friction })
         })
     };
-    let work = |part: (Range<usize>, WarmSegments<'_>)| pack_range(&rows, ends, collisions, part);
+    let work = |part: (Range<usize>, WarmSegments<'_>)| pack_range(&issue, ends, collisions, part);
     packers.each(count, cut, work, |of_range| sums = sums.and(of_range));
     sums
 }
 
-/// The rows of a collision's record that a channel carries; behind them it carries the impulses.
-struct ChannelRows {
-    rows: [usize; collision::ROWS],
+/// Beats of the collisions of an issue, at most.
+const BEATS_MAX: usize = 8;
+
+/// The collisions of an issue, as a channel carries them: beats that it has in every pass, and behind them
+/// one of impulses.
+struct Issue<'a> {
+    variant: &'a Variant,
+    /// Collisions.
+    together: usize,
+    /// Rows of a record, those of the impulses included.
+    rows: usize,
+    /// Places of the channel's beats among those that the issue has in every pass.
+    places: [usize; BEATS_MAX],
+    /// How many these are.
     count: usize,
 }
 
-impl ChannelRows {
-    fn of(layout: &Layout, channel: usize) -> Self {
-        let mut found = Self { rows: [0; collision::ROWS], count: 0 };
-        for row in layout.rows_on(channel).filter(|row| *row < collision::ROWS) {
-            found.rows[found.count] = row;
-            found.count += 1;
-        }
-        found
-    }
-
-    fn rows(&self) -> &[usize] {
-        &self.rows[..self.count]
-    }
-
-    /// Beats of a collision on the channel in a warm pass.
-    fn beats(&self) -> usize {
-        self.count + 1
+impl<'a> Issue<'a> {
+    fn of(variant: &'a Variant, channel: usize) -> Self {
+        let layout = Segment::WarmCollisions.layout(variant);
+        let together = variant.profile.collisions_per_issue as usize;
+        let beats = together * variant.collision_rows() / layout.rows_per_beat();
+        let mut places = [0; BEATS_MAX];
+        let on_channel = (0..beats).filter(|beat| layout.place(*beat).channel == channel);
+        let count = places.iter_mut().zip(on_channel).map(|(to, beat)| *to = beat).count();
+        Self { variant, together, rows: layout.rows, places, count }
     }
 }
 
 /// Writes a range of the collisions, otherwise as [`pack_warm`].
 fn pack_range<C: Collisions + ?Sized>(
-    rows: &ChannelRows,
+    issue: &Issue<'_>,
     ends: Ends<'_>,
     collisions: &C,
     (range, segments): (Range<usize>, WarmSegments<'_>),
 ) -> WarmSums {
-    let beats = rows.beats();
-    let mut contact = segments.contact.chunks_exact_mut(beats);
-    let mut friction = segments.friction.chunks_exact_mut(beats);
+    let limit = largest_impulse(&issue.variant.numbers);
+    let mut contact = segments.contact.chunks_exact_mut(issue.count + 1);
+    let mut friction = segments.friction.chunks_exact_mut(issue.count + 1);
     let mut sums = WarmSums::default();
-    let mut records = [0_u32; 4];
     let mut copies = [Collision::NOTHING; BLOCK];
+    let mut impulses = [Impulses::ZERO; BLOCK];
     for first in range.clone().step_by(BLOCK) {
         let (behind, end) = (range.end.min(first + BLOCK), range.end.min(first + 2 * BLOCK));
         // The next block is on its way while this one is written.
         (behind..end).for_each(|index| collisions.prefetch(index));
-        let copies = &mut copies[..behind - first];
-        for (copy, index) in copies.iter_mut().zip(first..) {
+        let (copies, impulses) = (&mut copies[..behind - first], &mut impulses[..behind - first]);
+        for ((copy, impulses), index) in copies.iter_mut().zip(&mut *impulses).zip(first..) {
             *copy = collisions.collision(index);
+            *impulses = collisions.impulses(index).used(copy);
+            sums.broken |= !impulses.are_within(limit);
             ends.soon([copy.body_a, copy.body_b]);
         }
-        for (copy, index) in copies.iter().zip(first..) {
-            let impulses = collisions.impulses(index).used(copy);
-            sums.broken |= !impulses.are_finite();
-            let counted = Counted::from(copy);
-            let bodies = [counted.collision.body_a, counted.collision.body_b];
-            let at = bodies.map(|body| ends.get(body));
-            let whole = record::collision::encode(counted, at).whole();
-            for row in whole {
-                for (sum, word) in records.iter_mut().zip(row.words()) {
-                    *sum = sum.wrapping_add(word);
+        let block = Block { first, collisions: Contiguous(copies), ends };
+        let to = [&mut contact, &mut friction];
+        macro_rules! written {
+            ($kind:expr) => {
+                in_wide_vectors(Writing {
+                    kind: $kind,
+                    rows: PhantomData,
+                    issue,
+                    block,
+                    impulses,
+                    to,
+                })
+            };
+        }
+        sums = sums.and(match issue.variant.profile.geometry {
+            Geometry::Absolute => written!(Absolute),
+            Geometry::Relative => written!(Relative),
+        });
+    }
+    sums
+}
+
+/// A block of collisions with their impulses, and the issues of both segments that they go to.
+struct Writing<'p, 'a, K, const ROWS: usize> {
+    kind: K,
+    rows: PhantomData<[Lanes; ROWS]>,
+    issue: &'p Issue<'p>,
+    block: Block<'p, Contiguous<'p>>,
+    impulses: &'p [Impulses],
+    to: [&'p mut ChunksExactMut<'a, Beat>; 2],
+}
+
+impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, K, ROWS> {
+    type Output = WarmSums;
+
+    #[inline(always)]
+    fn run<V: Vectors>(self, vectors: V) -> WarmSums {
+        let format = Sixteen::of(self.issue.variant.numbers.collisions);
+        in_format!(format, F => self.run_as::<V, F>(vectors))
+    }
+}
+
+impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
+    #[inline(always)]
+    fn run_as<V: Vectors, F: Format>(self, vectors: V) -> WarmSums {
+        let Self { kind, issue, block, impulses, to: [contact, friction], .. } = self;
+        let mut sums = WarmSums::default();
+        let Some(ends) = <K::Among<'p, F> as Lookup>::of(block.ends) else {
+            return WarmSums { broken: true, ..sums };
+        };
+        let mut records = Encoding::<_, _, _, _, false>::new(kind, &block, ends, ());
+        for first in (0..impulses.len()).step_by(issue.together) {
+            let of_issue = first..first + issue.together;
+            let mut usual = Made::<V, F>::new(vectors);
+            for nth in of_issue.clone() {
+                if records.some::<1>(nth, &mut usual).is_none() {
+                    // Padding fills the issue up.
+                    usual.zeros(ROWS);
                 }
             }
-            let Impulses { normal, friction: [first, second] } = impulses;
-            let kinds = [
+            sums.records = sums.records.wrapping_add(usual.sum);
+            let normal = |of: &Impulses| of.normal;
+            let tangential = |of: &Impulses| [of.friction[0], of.friction[1], 0.0, 0.0];
+            let kinds: [(_, fn(&Impulses) -> [f32; LANES], _); 2] = [
                 (contact.next(), normal, &mut sums.contact),
-                (friction.next(), [first, second, 0.0, 0.0], &mut sums.friction),
+                (friction.next(), tangential, &mut sums.friction),
             ];
-            for (to, impulses, sum) in kinds {
+            for (to, of, sum) in kinds {
                 let Some((last, others)) = to.and_then(|to| to.split_last_mut()) else { continue };
-                for (to, row) in others.iter_mut().zip(rows.rows()) {
-                    *to = Beat(whole[*row].words());
+                for (to, place) in others.iter_mut().zip(issue.places) {
+                    *to = usual.beats[place];
                 }
-                *last = Beat(impulses.map(f32::to_bits));
-                *sum = last.0.into_iter().fold(*sum, u32::wrapping_add);
+                let mut behind = Made::<V, F>::new(vectors);
+                for nth in of_issue.clone() {
+                    let words =
+                        impulses.get(nth).map_or([0; LANES], |all| of(all).map(f32::to_bits));
+                    behind.row(Row { numbers: Lanes::new(words), integer: None });
+                    behind.zeros(issue.rows - ROWS - 1);
+                }
+                *last = behind.beats[0];
+                *sum = sum.wrapping_add(behind.sum);
             }
         }
+        sums
     }
-    sums.records = records.into_iter().fold(0, u32::wrapping_add);
-    sums
+}
+
+/// The beats of rows.
+struct Made<V, F> {
+    joined: Beats<V, F>,
+    beats: [Beat; BEATS_MAX],
+    count: usize,
+    /// Sum of the words.
+    sum: u32,
+}
+
+impl<V: Vectors, F: Join> Made<V, F> {
+    #[inline(always)]
+    fn new(vectors: V) -> Self {
+        let beats = [Beat::default(); BEATS_MAX];
+        Self { joined: Beats::new(vectors), beats, count: 0, sum: 0 }
+    }
+
+    /// Adds rows of zeros.
+    #[inline(always)]
+    fn zeros(&mut self, rows: usize) {
+        (0..rows).for_each(|_| self.row(Row::zero()));
+    }
+}
+
+impl<V: Vectors, F: Join> Rows for Made<V, F> {
+    #[inline(always)]
+    fn row(&mut self, row: Row) {
+        let Some(beat) = self.joined.with(row) else { return };
+        self.sum = beat.0.into_iter().fold(self.sum, u32::wrapping_add);
+        if let Some(to) = self.beats.get_mut(self.count) {
+            *to = beat;
+            self.count += 1;
+        }
+    }
 }

@@ -5,3 +5,4 @@ mod pool;
 mod screen;
 mod screen_bodies;
 mod screen_properties;
+mod warm;

@@ -253,6 +253,15 @@ impl Variant {
         }
     }
 
+    /// Rows of a collision record of a warm pass.
+    #[must_use]
+    pub const fn warm_collision_rows(&self) -> usize {
+        match self.profile.geometry {
+            Geometry::Absolute => absolute::WARM_ROWS,
+            Geometry::Relative => relative::WARM_ROWS,
+        }
+    }
+
     /// 32-bit words of the records on the streams.
     #[must_use]
     pub const fn words(&self) -> RecordWords {

@@ -106,7 +106,8 @@ pub const HALF: Profile = Profile {
     stripes: Stripes::new(
         Stripe { streams: &[0, 0, 0, 1, 1, 1, 2], padded: true },
         Stripe { streams: &[0, 0, 1, 1, 2], padded: true },
-    ),
+    )
+    .with_warm_collisions(Stripe { streams: &[0, 0, 0, 1, 1, 1, 2, 2], padded: true }),
     initiation_interval: 3,
     collisions_per_issue: 2,
     flow: Flow::Passes,
@@ -134,7 +135,8 @@ pub const MIXED: Profile = Profile {
     stripes: Stripes::new(
         Stripe { streams: &[0, 1, 2], padded: false },
         Stripe { streams: &[0, 1, 2], padded: false },
-    ),
+    )
+    .with_warm_collisions(Stripe { streams: &[0, 1, 2, 2], padded: false }),
     initiation_interval: 1,
     collisions_per_issue: 1,
     flow: Flow::Passes,

@@ -35,7 +35,7 @@ pub(crate) struct Array {
 
 impl Array {
     pub(crate) fn new(striping: Striping, records: Records) -> Self {
-        let rows_per_beat = (u32::BITS / records.format.bits()) as usize;
+        let rows_per_beat = records.format.rows_per_beat();
         let rows = records.count.next_multiple_of(records.together) * records.rows;
         let beats = striping.padded(rows.div_ceil(rows_per_beat));
         Self {

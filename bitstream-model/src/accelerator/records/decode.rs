@@ -89,16 +89,10 @@ impl Collision {
         }
     }
 
-    /// A record of a warm pass, in world coordinates and f32: one of the other passes, and the impulses.
+    /// The collision with the impulses of a row that a warm pass brings.
     #[inline(always)]
-    pub(crate) fn warm(rows: &[Row; collision::WARM_ROWS], pair_friction: bool) -> Self {
-        const _: () = assert!(collision::IMPULSES == collision::ROWS);
-        let [record @ .., impulses] = rows;
-        let collision = match pair_friction {
-            true => Self::with_friction(record),
-            false => Self::absolute(StreamFormat::F32, record),
-        };
-        Self { impulses: vec4(StreamFormat::F32, *impulses), ..collision }
+    pub(crate) fn with_impulses(self, format: StreamFormat, impulses: Row) -> Self {
+        Self { impulses: vec4(format, impulses), ..self }
     }
 
     /// A record relative to body A, which then stands at the origin. Points at a distance of

@@ -38,9 +38,9 @@ impl Segment {
         self.array.cycles(self.done)
     }
 
-    /// Clock cycles that the streams take for one record alone.
-    pub(crate) fn cycles_of_one(&self) -> u64 {
-        self.array.cycles(1)
+    /// Clock cycles that the streams take for `records` records alone.
+    pub(crate) fn cycles_of(&self, records: usize) -> u64 {
+        self.array.cycles(records)
     }
 
     /// Whole records that have arrived and were not read yet.
@@ -179,7 +179,13 @@ impl Reader<'_> {
     /// The rows of the next record.
     #[inline]
     pub(crate) fn record<const ROWS: usize>(&mut self) -> [Row; ROWS] {
-        debug_assert!(ROWS == self.segment.array.rows, "the caller knows the record");
+        debug_assert!(ROWS <= self.segment.array.rows, "the caller knows the record");
+        self.rows()
+    }
+
+    /// The next rows.
+    #[inline]
+    pub(crate) fn rows<const ROWS: usize>(&mut self) -> [Row; ROWS] {
         let mut rows = [[0; LANES]; ROWS];
         if self.segment.array.rows_per_beat == 1 {
             for row in &mut rows {

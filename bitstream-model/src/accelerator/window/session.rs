@@ -69,8 +69,8 @@ impl Windowed {
         poses: Segment,
         results: Results,
     ) -> Self {
-        let leave_interval = poses.cycles_of_one().max(results.cycles_of_one());
-        let idle_interval = leave_interval.max(velocities.cycles_of_one());
+        let leave_interval = poses.cycles_of(1).max(results.cycles_of_one());
+        let idle_interval = leave_interval.max(velocities.cycles_of(1));
         Self {
             flow,
             collisions,

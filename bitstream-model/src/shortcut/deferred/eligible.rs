@@ -55,7 +55,7 @@ impl Layout {
         let (format, geometry) = (numbers.collisions, profile.geometry);
         let together = profile.collisions_per_issue as usize;
         let rows = together * variant.collision_rows();
-        let rows_per_beat = (u32::BITS / format.bits()) as usize;
+        let rows_per_beat = format.rows_per_beat();
         let beats = rows / rows_per_beat;
         let group = profile.stripes.collisions.streams.len();
         // Every issue begins at a beat and at a group.

@@ -173,9 +173,8 @@ impl ModelArgs {
             && !PROFILES.iter().copied().any(|profile| starts_warm(&profile))
         {
             let message = format!("the section warm has nothing about profile {}", self.profile);
-            return Err(
-                Failure::input(message).next("ask for --profile naive or float, or for all")
-            );
+            return Err(Failure::input(message)
+                .next("ask for --profile naive, float, half or mixed, or for all"));
         }
         Ok(())
     }
