@@ -183,6 +183,9 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, K, ROWS> {
     }
 }
 
+/// The impulses of one kind, as a row.
+type OfKind = fn(&Impulses) -> [f32; LANES];
+
 impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> WarmSums {
@@ -204,8 +207,8 @@ impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
             sums.records = sums.records.wrapping_add(usual.sum);
             let normal = |of: &Impulses| of.normal;
             let tangential = |of: &Impulses| [of.friction[0], of.friction[1], 0.0, 0.0];
-            let kinds: [(_, fn(&Impulses) -> [f32; LANES], _); 2] = [
-                (contact.next(), normal, &mut sums.contact),
+            let kinds = [
+                (contact.next(), normal as OfKind, &mut sums.contact),
                 (friction.next(), tangential, &mut sums.friction),
             ];
             for (to, of, sum) in kinds {
