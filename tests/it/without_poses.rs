@@ -112,6 +112,7 @@ fn other_extensions_work_without_poses() {
         }
     }
     let frictions: Vec<Shape> = isotropic().into_iter().map(|it| it.with_friction(0.5)).collect();
+    bodies[0].velocity = Velocity::default();
     for profile in [&HALF, &MIXED] {
         let config = BoardConfig { profile, ..BoardConfig::default() };
         let scene = (bodies.clone(), collisions.clone());

@@ -44,6 +44,7 @@ use pgs_interface::record::CONTACT_POINTS;
 use control::{Arguments, Counters, Registers, Request};
 use defer::Deferral;
 use hazards::Pipeline;
+use records::decode::Collision;
 use records::results::Results;
 use records::segment::Segment;
 use solver::{Impulses, Velocity};
@@ -105,6 +106,8 @@ pub(crate) struct Accelerator {
     /// With world inertia, that of each body.
     pub(crate) inertias: Vec<arithmetic::inertia::Stored>,
     pub(crate) impulses: Vec<Impulses>,
+    /// The collisions of the issue under way in a warm pass; kept for its memory.
+    warm_issue: Vec<Collision>,
     window: Option<Box<window::Windowed>>,
 }
 
@@ -134,6 +137,7 @@ impl Accelerator {
             inverse_masses: Vec::new(),
             inertias: Vec::new(),
             impulses: Vec::new(),
+            warm_issue: Vec::new(),
             window: None,
         }
     }

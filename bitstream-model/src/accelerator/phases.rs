@@ -273,12 +273,13 @@ impl Accelerator {
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
-        let mut together = Vec::with_capacity(if warm { per_issue } else { 0 });
+        let mut together = std::mem::take(&mut self.warm_issue);
+        together.clear();
         while records < available && cycles <= limit {
             let issue = (available - records).min(per_issue);
             let first = segment.done + records;
             if warm {
-                self.warm_issue(&mut reader, &mut together);
+                self.read_warm_issue(&mut reader, &mut together);
             }
             for at in 0..issue {
                 let index = first + at;
@@ -297,6 +298,7 @@ impl Accelerator {
             cycles += interval;
             records += issue;
         }
+        self.warm_issue = together;
         let sum = segment.advance(records, inputs);
         self.received(sum);
         Ok(cycles)
@@ -304,7 +306,7 @@ impl Accelerator {
 
     /// Reads the collisions of the next issue of a warm pass, padding included: their records, and then the
     /// impulses of each.
-    fn warm_issue(&self, reader: &mut Reader<'_>, together: &mut Vec<Collision>) {
+    fn read_warm_issue(&self, reader: &mut Reader<'_>, together: &mut Vec<Collision>) {
         let profile = self.variant.profile;
         let format = self.variant.numbers.collisions;
         together.clear();

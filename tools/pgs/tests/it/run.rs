@@ -124,7 +124,7 @@ fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
     let deepest =
         |of: &Value| of["steps"][239]["deepest_penetration_m"].as_f64().expect("a number");
     assert!(deepest(&warm) < 0.5 * deepest(&cold), "{} m, {} m", deepest(&warm), deepest(&cold));
-    let refused = run("run --profile half --grid 2x2x2 --warm-start".split(' '));
+    let refused = run("run --profile windowed --grid 2x2x2 --warm-start".split(' '));
     assert_eq!(refused.code, Some(2), "{}", refused.stderr);
     assert!(
         refused.stderr.contains("a warm start") && refused.stderr.contains("naive"),
@@ -181,7 +181,7 @@ fn shapes_are_stepped_warm_beside_the_same_ones_cold() {
 /// A design without a warm start steps the shapes cold, unless it is asked for one.
 #[test]
 fn shapes_are_cold_where_the_design_has_no_warm_start() {
-    let options = "--scene shapes --grid 2x2x2 --steps 2 --profile mixed";
+    let options = "--scene shapes --grid 2x2x2 --steps 2 --profile windowed";
     assert_eq!(document(options)["config"]["warm_start"], false);
     let refused = run(format!("run {options} --warm-start").split(' '));
     assert_eq!(refused.code, Some(2), "{}", refused.stderr);
