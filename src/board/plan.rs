@@ -268,7 +268,7 @@ mod tests {
         assert_eq!((plan.impulses(0), plan.segments(3).warm_friction), (collisions, None));
     }
 
-    /// Half the beats out, and the poses in, of `float`; the padding of `half`.
+    /// `float` sends no poses and receives half the beats; `half` receives whole groups of five.
     #[test]
     fn a_step_without_poses_brings_velocities_back() {
         let plan = Plan { velocities_only: true, ..FOUR };

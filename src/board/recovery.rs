@@ -122,7 +122,7 @@ impl Device {
     pub(crate) fn load_shapes(&mut self, shapes: &[Shape]) {
         if !self.capabilities.streams_masses(shapes.len()) {
             let Capabilities { variant, extensions, .. } = &self.capabilities;
-            self.control.load_shapes(shapes, variant.inertia, extensions.shape_friction);
+            self.control.load_shapes(shapes, variant.inertia, *extensions);
         }
     }
 

@@ -31,8 +31,8 @@ fn parameters() -> StepParameters {
     ordered(Order::AsGiven).with_shape_friction(true)
 }
 
-/// With frictions whose products are exact in binary16, each cube ends as in a step whose one friction is the
-/// product of its own and the ground's.
+/// Each cube ends as in a step with one friction, the product of its own and the ground's. The products are
+/// exact in binary16.
 #[test]
 fn the_friction_of_a_collision_is_the_product_of_both_shapes() {
     let frictions = [0.0, 0.25, 0.5, 1.0];

@@ -226,8 +226,8 @@ fn short_impulses(of: &Impulses) -> Impulses {
     Impulses { normal: of.normal.map(short), friction: of.friction.map(short) }
 }
 
-/// The world in numbers of binary16, which also its points are as seen from a body: positions are in
-/// sixty-fourths of a metre.
+/// The world in numbers of binary16. Positions are multiples of 1/64 m, so that contact points relative to a
+/// body are numbers of binary16, too.
 fn short_world() -> (Vec<Body>, Vec<Collision>) {
     let (mut bodies, mut collisions) = world();
     let on_grid = |value: f32| (value * 64.0).round() / 64.0;
@@ -238,7 +238,7 @@ fn short_world() -> (Vec<Body>, Vec<Collision>) {
         body.velocity.angular = body.velocity.angular.map(short);
     }
     for collision in &mut collisions {
-        // A third of a sum would be rounded, and otherwise in each of the two.
+        // A third of a sum is rounded, and the rounding of relative points differs from that of absolute ones.
         if collision.count == 3 {
             collision.count = 4;
         }

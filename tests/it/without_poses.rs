@@ -56,7 +56,8 @@ fn isotropic() -> Vec<Shape> {
     shapes().map(equal).to_vec()
 }
 
-/// Beats of `bodies` records of two rows: a beat a row, or half of one and whole groups of five.
+/// Bytes of `bodies` records of two rows. In f32 a row is a beat; in `half` it is half a beat, and groups of
+/// five beats are whole.
 fn bytes_of_two_rows(profile: &Profile, bodies: u64) -> u64 {
     let beats = if *profile == HALF { bodies.next_multiple_of(5) } else { 2 * bodies };
     16 * beats

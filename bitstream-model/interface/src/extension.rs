@@ -78,11 +78,11 @@ impl Extensions {
     /// The extensions that a bitstream of a variant can have. A static body that moves needs its
     /// record, its own position in the records of collisions (a relative one gives it the other
     /// body's), and a zero for a component at rest. A friction needs a contact count of 32 bits beside it.
-    /// Impulses need passes one after the other, a stripe for their records, and a zero, with which a
-    /// collision begins that has none. A streamed mass needs the rows of a world inertia beside it, and an
-    /// array of numbers for all bodies. A step without poses needs all velocities on chip at the end of the
-    /// passes. The shapes have a friction where the collisions have no room for one, and where static bodies
-    /// have records: these name their shapes.
+    /// Impulses need passes one after the other, a stripe for their records, and a number format with a
+    /// zero. A streamed mass needs the rows of a world inertia beside it, and an array of numbers for all
+    /// bodies. A step without poses needs all velocities on chip at the end of the passes. A friction for
+    /// each shape is for collision records without room for a friction, and needs a record, which names
+    /// the shape, for static bodies, too.
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, inertia } = variant;

@@ -1,10 +1,11 @@
 // One stream into the accelerator: checks its packets against the step, adds up its words,
 // and keeps the beats in a FIFO until a record takes them.
 //
-// A step has a packet of velocities, one of collisions in every pass, and one of poses. Beats of a
-// body are dealt to the four streams in turn: two a body, but for a velocity with world inertia, which has
-// four. Of the seven beats of a collision streams 0, 1 and 2 carry two and stream 3 one, and in a warm pass stream 3 carries a second one, its impulses
-// (specification, sections 2 and 3). A packet without a beat does not exist.
+// A step has a packet of velocities, one of collisions in every pass, and one of poses. The beats of a
+// body are dealt to the four streams in turn: two a body, and four for a velocity with world inertia.
+// Of the seven beats of a collision, streams 0, 1 and 2 carry two, and stream 3 carries one. In a warm
+// pass stream 3 carries a second one, the impulses (specification, sections 2 and 3). A packet without
+// a beat does not exist.
 //
 // All lengths are registered before `start`, and the end of a packet is a flag that a down-counter
 // prepares: no comparison of lengths lies on the way of a beat.

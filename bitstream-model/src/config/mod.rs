@@ -404,7 +404,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
         ),
         (
             stripes.warm_collisions.is_some_and(|warm| {
-                // Beyond it both go on as they began.
+                // Both stripes repeat themselves after this number of beats.
                 let beats = issue_beats.min(GROUP_MAX * GROUP_MAX);
                 let begin = |of: Stripe| of.streams.iter().cycle().take(beats);
                 !stripe(&warm, profile.mm2s_widths) || !begin(warm).eq(begin(stripes.collisions))

@@ -51,7 +51,7 @@ static PAIRS: Profile = Profile {
     initiation_interval: 2,
     ..HALF
 };
-/// Its issues have other beats than a warm pass of `mixed` begins with.
+/// Its collisions are in f32, so that the stripe of `mixed`'s warm passes does not fit them.
 const RELATIVE: Profile = Profile {
     numbers: Numbers::F32,
     stripes: Stripes { warm_collisions: None, ..MIXED.stripes },

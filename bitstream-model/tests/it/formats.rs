@@ -438,7 +438,7 @@ proptest! {
         }
     }
 
-    /// The same with impulses: those of `float` that were on the streams of `half` or `mixed` are solved.
+    /// A warm step on `half` or `mixed` gives the bits of `float`, whose impulses are rounded to binary16 before.
     #[test]
     fn impulses_that_come_in_sixteen_bits_are_solved_as_those_of_float(step in warm_scene()) {
         let words = received(&step, BINARY16, BINARY16);
@@ -475,7 +475,7 @@ proptest! {
         prop_assert_eq!(half.impulse_sum, reference.impulse_sum);
     }
 
-    /// What went out of a step goes into the next one with the same bits, where it is in binary16.
+    /// `half` gives out binary16 impulses. The next step takes them in without a change of a bit.
     #[test]
     fn impulses_of_half_come_back_as_they_went_out(step in warm_scene()) {
         let step = Step { iterations: [1, 1], impulses_out: true, ..step };

@@ -7,8 +7,7 @@ use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
 use crate::common::scene::{Step, bits, result_beats};
 use crate::common::sg::{Flight, LONG, Machine};
 
-/// Half the beats out, none in, and the velocities of the same step with poses, on every profile whose
-/// passes run one after the other.
+/// The velocities are those of the same step with poses. No poses go in, and half the beats come out.
 #[test]
 fn a_step_without_poses_gives_out_velocities_alone() {
     for profile in [&FLOAT, &NAIVE, &HALF, &MIXED] {

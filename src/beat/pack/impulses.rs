@@ -1,6 +1,6 @@
-//! Writes the collision segments of the warm passes into the buffer of the channel that carries
-//! impulses: behind the beats that an issue of collisions has there in every pass, a beat of their
-//! impulses.
+//! Writes the collision segments of the warm passes for the channel that carries impulses. A segment
+//! repeats, issue by issue, the collision beats of the channel, and adds a beat of impulses to each
+//! issue.
 //!
 //! The other channels have the same beats in every pass.
 
@@ -60,7 +60,7 @@ impl WarmSums {
 /// Writes the collisions of both warm passes. The records of the other passes are written already: the
 /// sum of the words tells whether the caller's collisions are still the same.
 ///
-/// Shape: a segment has as many beats as the layout of [`Segment::WarmCollisions`] says of the channel.
+/// Shape: the layout of [`Segment::WarmCollisions`] gives the number of beats of a segment on this channel.
 pub(crate) fn pack_warm<C: Collisions + ?Sized>(
     variant: &Variant,
     channel: usize,
@@ -91,17 +91,17 @@ pub(crate) fn pack_warm<C: Collisions + ?Sized>(
 /// Beats of the collisions of an issue, at most.
 const BEATS_MAX: usize = 8;
 
-/// The collisions of an issue, as a channel carries them: beats that it has in every pass, and behind them
-/// one of impulses.
+/// The beats of an issue on the channel that carries impulses: its collision beats, then a beat of
+/// impulses.
 struct Issue<'a> {
     variant: &'a Variant,
-    /// Collisions.
+    /// Collisions of an issue.
     together: usize,
-    /// Rows of a record, those of the impulses included.
+    /// Rows of a collision with its impulses.
     rows: usize,
-    /// Places of the channel's beats among those that the issue has in every pass.
+    /// The collision beats of this channel: their numbers among all collision beats of the issue.
     places: [usize; BEATS_MAX],
-    /// How many these are.
+    /// Number of collision beats on this channel.
     count: usize,
 }
 
@@ -163,7 +163,7 @@ fn pack_range<C: Collisions + ?Sized>(
     sums
 }
 
-/// A block of collisions with their impulses, and the issues of both segments that they go to.
+/// A block of collisions with their impulses, and its place in both segments.
 struct Writing<'p, 'a, K, const ROWS: usize> {
     kind: K,
     rows: PhantomData<[Lanes; ROWS]>,

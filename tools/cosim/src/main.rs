@@ -380,7 +380,7 @@ fn run_errors(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure
     Ok(good)
 }
 
-/// Whether each design as it is shows no difference, and each mutant of it one.
+/// Returns whether each design shows no difference, and each mutant of a design shows one.
 fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<bool, Failure> {
     let mut all_found = true;
     for form in [InertiaForm::Isotropic, InertiaForm::World] {

@@ -11,6 +11,14 @@ pub(crate) fn matrix([x, y, z, w]: [f32; 4]) -> [[f32; 3]; 3] {
     ]
 }
 
+/// A point of a body in the world. `rows` is the [`matrix`] of the body.
+pub(crate) fn placed(centre: [f32; 3], rows: &[[f32; 3]; 3], [px, py, pz]: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|row| {
+        let [x, y, z] = rows[row];
+        centre[row] + ((x * px + y * py) + z * pz)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -43,7 +43,7 @@ enum Extension {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Build")]
 pub(crate) struct BuildArgs {
-    /// Inertia of a body: equal about every axis, or any (boxes, capsules), streamed with every body
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with every body
     #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
     inertia: InertiaForm,
     /// Bodies that the memories hold [default: 40960; with world inertia 16384]

@@ -25,12 +25,7 @@ pub(crate) fn all_points(
     let mut parry = Parry::default();
     let (_, places) = parry.ask([body_a, body_b], [geometries.of(body_a)?, geometry_b])?;
     let rows = rotation::matrix(body_b.pose.orientation);
-    let in_world = |[x, y, z]: [f32; 3]| {
-        [0, 1, 2].map(|k| {
-            let row = rows[k];
-            body_b.pose.position[k] + ((row[0] * x + row[1] * y) + row[2] * z)
-        })
-    };
+    let in_world = |point| rotation::placed(body_b.pose.position, &rows, point);
     let contacts = places
         .iter()
         .map(|place| Contact { point: in_world(place.on_b), distance: place.distance });

@@ -70,7 +70,7 @@ pub(super) fn collide(index: u32, body: &Body, geometry: Geometry) -> Option<Col
         Geometry::Hull { points: corners } => {
             let rows = rotation::matrix(body.pose.orientation);
             for corner in corners {
-                points.offer(placed(centre, &rows, *corner));
+                points.offer(rotation::placed(centre, &rows, *corner));
             }
         }
     }
@@ -101,7 +101,7 @@ fn offer_face(body: &Body, half_extents: [f32; 3], points: &mut Points) {
         corner[axis] = down;
         corner[u] = su * half_extents[u];
         corner[v] = sv * half_extents[v];
-        points.offer(placed(centre, &rows, corner));
+        points.offer(rotation::placed(centre, &rows, corner));
     }
 }
 
@@ -117,19 +117,11 @@ fn offer_rims(body: &Body, half_height: f32, radius: f32, points: &mut Points) {
     let (dx, dz) =
         if is_upright { (radius, 0.0) } else { (-x / across * radius, -z / across * radius) };
     for corner in [[dx, below, dz], [-dz, below, dx], [dz, below, -dx], [-dx, below, -dz]] {
-        points.offer(placed(centre, &rows, corner));
+        points.offer(rotation::placed(centre, &rows, corner));
     }
     if !is_upright {
-        points.offer(placed(centre, &rows, [dx, -below, dz]));
+        points.offer(rotation::placed(centre, &rows, [dx, -below, dz]));
     }
-}
-
-/// A point of a body in the world.
-fn placed(centre: [f32; 3], rows: &[[f32; 3]; 3], [px, py, pz]: [f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|row| {
-        let [x, y, z] = rows[row];
-        centre[row] + ((x * px + y * py) + z * pz)
-    })
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl NormalCause {
     }
 }
 
-/// Why a point of the folder is none of ours.
+/// The reason for which the folder has a point that we lack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PointCause {
     Same,

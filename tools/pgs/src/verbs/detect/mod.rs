@@ -36,7 +36,8 @@ other body is a cube of 2 m, as in Bullet's demo: a folder says nothing of shape
 2 cm apart collide.
 
 Each broad phase runs twice: from nothing, and again after all bodies have moved by their
-velocities for one time step, with its lists kept. Both must find one list of pairs each time.
+velocities for one time step, with its lists kept. Both must find one list of pairs each time, else
+the exit code is 1.
 
 --compare holds pairs, normals and points against the folder's. It fails, with exit code 1, if a
 pair deeper than 1 mm is missing or extra. Every normal more than 0.01 degrees off and every point
