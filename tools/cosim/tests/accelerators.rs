@@ -1,9 +1,8 @@
 //! Boards whose accelerator is another process or runs in lock step with the model. The model plays the
 //! hardware, with planted flaws: no simulator need be built.
 
-use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 
 use bitstream_model::external::{
@@ -42,9 +41,12 @@ fn golden(name: &str) -> Folder {
 fn program(folder: &Path, options: &str) -> PathBuf {
     let path = folder.join("simulator");
     let cosim = env!("CARGO_BIN_EXE_cosim");
-    fs::write(&path, format!("#!/bin/sh\nexec '{cosim}' model {options} \"$@\"\n"))
-        .expect("a file");
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("permissions");
+    let text = format!("#!/bin/sh\nexec '{cosim}' model {options} \"$@\"\n");
+    // Another process writes the file. Written here, a child that another test starts at this moment
+    // would inherit the open file, and the kernel refuses to execute a file open for writing.
+    let writes = "printf %s \"$1\" > \"$0\" && chmod 755 \"$0\"";
+    let written = Command::new("sh").args(["-c", writes]).arg(&path).arg(text).status();
+    assert!(written.expect("a shell").success());
     path
 }
 
