@@ -6,7 +6,7 @@ use bitstream_model::estimate::{MemoryUse, PortAccount, Records, StepTime};
 use bitstream_model::interface::profile::{FLOAT, MIXED, Variant};
 
 use super::ports::PUMP;
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib};
 
 /// The table, if `mixed` is among the profiles.

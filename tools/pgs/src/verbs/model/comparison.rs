@@ -11,7 +11,7 @@ use bitstream_model::estimate::thesis::recorded::{
 use bitstream_model::estimate::{Records, StepTime};
 use bitstream_model::interface::profile::Variant;
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {

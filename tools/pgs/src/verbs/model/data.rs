@@ -3,7 +3,7 @@
 use bitstream_model::estimate::thesis::data::{DataTable, TABLES};
 use bitstream_model::estimate::{Records, StepTraffic};
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, printed_mib};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {

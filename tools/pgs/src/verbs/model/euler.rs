@@ -2,7 +2,7 @@
 
 use bitstream_model::estimate::thesis::euler::{exact, explicit, explicit_single};
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::difference;
 
 pub(super) fn tables() -> Vec<Table> {

@@ -3,7 +3,7 @@
 
 use bitstream_model::estimate::{Access, AccessKind, PortAccount, PortUse, Slot};
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
 
 /// The pump's demands on the device, and what is known of them.

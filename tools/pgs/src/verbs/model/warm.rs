@@ -2,7 +2,7 @@
 
 use bitstream_model::estimate::{WarmCost, WarmStart};
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::Scene;
 
 /// The table, if one of the profiles has a warm start.

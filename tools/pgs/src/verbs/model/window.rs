@@ -6,7 +6,7 @@ use bitstream_model::estimate::{
 };
 use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
 
-use super::report::{Cell, Kind, Table, text};
+use super::table::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, yes_or_no};
 
 /// Whether a profile streams the collisions once.
