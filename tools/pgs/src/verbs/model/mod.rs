@@ -30,8 +30,8 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
 use crate::options::build::number;
-use table::Table;
 use scene::Scene;
+use table::Table;
 
 const EXAMPLES: &str = "\
 Examples:

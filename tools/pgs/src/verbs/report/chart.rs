@@ -12,14 +12,13 @@ const SIZE: (u32, u32) = (860, 430);
 const INK: RGBColor = RGBColor(1, 2, 3);
 const GRID: RGBColor = RGBColor(4, 5, 6);
 /// Colours that colour-blind people can tell apart (Okabe and Ito), on light and on dark.
-const COLOURS: [RGBColor; 7] = [
+const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
     RGBColor(213, 94, 0),
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
-    RGBColor(153, 153, 153),
 ];
 /// Size of the numbers at the axes.
 const SMALL: i32 = 13;
@@ -94,7 +93,9 @@ impl<'a> Axis<'a> {
     fn labels(self, range: &std::ops::Range<f64>) -> usize {
         match self.scale {
             // One a decade, as long as a label has room.
-            Scale::Log => (1..=14).take_while(|k| f64::from(*k) <= range.end - range.start + 1.0).count(),
+            Scale::Log => {
+                (1..=14).take_while(|k| f64::from(*k) <= range.end - range.start + 1.0).count()
+            }
             Scale::Linear => 8,
         }
     }
@@ -143,7 +144,8 @@ pub(super) fn lines(x: Axis<'_>, y: Axis<'_>, series: &[Series]) -> Result<Strin
     let all = || places.iter().flatten();
     let across = x.range(all().map(|place| place.0));
     let up = y.range(all().map(|place| place.1));
-    draw(|area| {
+    let names: Vec<&str> = series.iter().map(|series| series.name.as_str()).collect();
+    draw(&names, |area| {
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .x_label_area_size(48)
@@ -169,30 +171,21 @@ pub(super) fn lines(x: Axis<'_>, y: Axis<'_>, series: &[Series]) -> Result<Strin
             let colour = *colour;
             let dots = || points.iter().map(move |&at| Circle::new(at, 3, colour.filled()));
             let stroke = colour.stroke_width(2);
-            let named = match series.drawn {
-                Drawn::Dots => chart
-                    .draw_series(points.iter().map(|&at| Circle::new(at, 2, colour.mix(0.6).filled()))),
-                Drawn::Dashes => chart.draw_series(DashedLineSeries::new(points.clone(), 7, 5, stroke)),
+            let drawn = match series.drawn {
+                Drawn::Dots => chart.draw_series(
+                    points.iter().map(|&at| Circle::new(at, 2, colour.mix(0.6).filled())),
+                ),
+                Drawn::Dashes => {
+                    chart.draw_series(DashedLineSeries::new(points.clone(), 7, 5, stroke))
+                }
                 Drawn::Line | Drawn::Marked => {
                     chart.draw_series(LineSeries::new(points.clone(), stroke))
                 }
             };
-            named
-                .map_err(failed)?
-                .label(&series.name)
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(3)));
+            drawn.map_err(failed)?;
             if series.drawn == Drawn::Marked {
                 chart.draw_series(dots()).map_err(failed)?;
             }
-        }
-        if series.len() > 1 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .border_style(TRANSPARENT)
-                .label_font(("sans-serif", SMALL, &INK))
-                .draw()
-                .map_err(failed)?;
         }
         Ok(())
     })
@@ -209,7 +202,8 @@ pub(super) fn bars(
     let most = values.iter().flatten().flatten().copied().fold(0.0, f64::max) * 1.15;
     let slots = groups.len() * (names.len() + 1);
     let wide = f64::from(u32::try_from(slots).unwrap_or(u32::MAX));
-    draw(|area| {
+    let legend: Vec<&str> = names.iter().map(String::as_str).collect();
+    draw(&legend, |area| {
         let mut chart = ChartBuilder::on(area)
             .margin(8)
             .x_label_area_size(34)
@@ -240,50 +234,73 @@ pub(super) fn bars(
             for (k, value) in values.iter().enumerate() {
                 let colour = COLOURS[k % COLOURS.len()];
                 if let Some(value) = *value {
-                    let bar = Rectangle::new([(from + 0.06, 0.0), (from + 0.94, value)], colour.filled());
+                    let bar =
+                        Rectangle::new([(from + 0.06, 0.0), (from + 0.94, value)], colour.filled());
                     chart.draw_series([bar]).map_err(failed)?;
                     let top = chart.backend_coord(&(from + 0.5, value));
-                    let text = Text::new(format!("{value:.2}"), (top.0, top.1 - 3), centred.clone());
+                    let text =
+                        Text::new(format!("{value:.2}"), (top.0, top.1 - 3), centred.clone());
                     area.draw(&text).map_err(failed)?;
                 }
                 from += 1.0;
             }
             from += 1.0;
         }
-        for (k, name) in names.iter().enumerate() {
-            let colour = COLOURS[k % COLOURS.len()];
-            chart
-                .draw_series(std::iter::empty::<Rectangle<(f64, f64)>>())
-                .map_err(failed)?
-                .label(name.as_str())
-                .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .border_style(TRANSPARENT)
-            .label_font(("sans-serif", SMALL, &INK))
-            .draw()
-            .map_err(failed)
+        Ok(())
     })
 }
 
-fn draw(on: impl FnOnce(&Area<'_>) -> Result<(), Failure>) -> Result<String, Failure> {
+/// Draws a chart below its legend, which one series alone does not need.
+fn draw(
+    names: &[&str],
+    on: impl FnOnce(&Area<'_>) -> Result<(), Failure>,
+) -> Result<String, Failure> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-        on(&area)?;
+        let names = if names.len() > 1 { names } else { &[] };
+        let (legend, chart) = area.split_vertically(legend_height(names.len()));
+        draw_legend(&legend, names)?;
+        on(&chart)?;
         area.present().map_err(failed)?;
     }
     Ok(themed(&text))
 }
 
+/// Names beside each other in a legend, and the space of each.
+const IN_A_ROW: usize = 3;
+const NAME_WIDTH: i32 = 265;
+const ROW_HEIGHT: i32 = 20;
+
+fn legend_height(names: usize) -> i32 {
+    let rows = i32::try_from(names.div_ceil(IN_A_ROW)).unwrap_or(i32::MAX);
+    if rows == 0 { 0 } else { rows.saturating_mul(ROW_HEIGHT).saturating_add(6) }
+}
+
+fn draw_legend(area: &Area<'_>, names: &[&str]) -> Result<(), Failure> {
+    let style =
+        ("sans-serif", SMALL, &INK).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
+    for ((row, names), colours) in
+        (0..).zip(names.chunks(IN_A_ROW)).zip(COLOURS.chunks(IN_A_ROW).cycle())
+    {
+        for ((column, name), colour) in (0..).zip(names).zip(colours) {
+            let (x, y) = (70 + column * NAME_WIDTH, 14 + row * ROW_HEIGHT);
+            let mark = Rectangle::new([(x, y - 3), (x + 18, y + 3)], colour.filled());
+            area.draw(&mark).map_err(failed)?;
+            area.draw(&Text::new(*name, (x + 24, y), style.clone())).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
 /// Makes the chart scale with the page and take its colours.
 fn themed(text: &str) -> String {
     let (width, height) = SIZE;
-    text.replace("#010203", "currentColor")
-        .replace("#040506", "var(--grid, #cccccc)")
-        .replacen(&format!("width=\"{width}\" height=\"{height}\" "), "", 1)
+    text.replace("#010203", "currentColor").replace("#040506", "var(--grid, #cccccc)").replacen(
+        &format!("width=\"{width}\" height=\"{height}\" "),
+        "",
+        1,
+    )
 }
 
 #[cfg(test)]
@@ -300,7 +317,7 @@ mod tests {
         for label in ["0.01", "0.1", "10", "deviation, %", "one", "two"] {
             assert!(text.contains(&format!("\n{label}\n")), "{label}: {text}");
         }
-        assert_eq!(text.matches("<polyline").count() - 2, text.matches("<circle").count() * 3);
+        assert_eq!(text.matches("<circle").count(), 1);
         assert!(!text.contains("#010203") && text.contains("currentColor"), "{text}");
         assert!(text.contains("viewBox") && !text.contains("width=\"860\" height"), "{text}");
     }

@@ -49,11 +49,5 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     part.append(figures::designs::part()?);
     part.rows.extend(tables::rows(&tables)?);
     bar.finish_and_clear();
-    Ok(Report {
-        step: step.name,
-        given: args.input.is_some(),
-        quick: args.quick,
-        part,
-        tables,
-    })
+    Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part, tables })
 }

@@ -21,9 +21,10 @@ struct Source {
     unit: &'static str,
 }
 
+/// A table of words, whose rows are one row of the index: before and after each reduction.
 const fn words(table: &'static str, thesis: &'static str) -> Source {
-    let (names, recorded, ours) = (&["state"], "thesis_words", "words");
-    Source { table, thesis, section: "data", names, recorded, ours, unit: " words" }
+    let (recorded, ours) = ("thesis_words", "words");
+    Source { table, thesis, section: "data", names: &[], recorded, ours, unit: " words" }
 }
 
 const SOURCES: [Source; 13] = [
@@ -119,24 +120,39 @@ pub(super) fn rows(tables: &[Table]) -> Result<Vec<Row>, Failure> {
         };
         let names = source.names.iter().map(|key| column(key)).collect::<Result<Vec<_>, _>>()?;
         let (recorded, ours) = (column(source.recorded)?, column(source.ours)?);
-        for row in &table.rows {
+        if source.names.is_empty() {
+            let together = |column: usize| {
+                let cells: Vec<String> = table.rows.iter().map(|row| shown(&row[column])).collect();
+                cells.join(" → ") + source.unit
+            };
+            let subject = table.title.split(':').next().unwrap_or_default();
+            let subject = subject.trim_start_matches(table.id).trim().to_owned();
+            rows.push(row(source, table, subject, together(recorded), together(ours)));
+            continue;
+        }
+        for cells in &table.rows {
             // Powers of the thesis alone have no figure of ours to stand beside it.
-            if [recorded, ours].iter().any(|column| row[*column] == Cell::Missing) {
+            if [recorded, ours].iter().any(|column| cells[*column] == Cell::Missing) {
                 continue;
             }
-            let subject: Vec<String> = names.iter().map(|column| shown(&row[*column])).collect();
-            rows.push(Row {
-                thesis: source.thesis.to_owned(),
-                subject: subject.join(", "),
-                recorded: format!("{}{}", shown(&row[recorded]), source.unit),
-                ours: format!("{}{}", shown(&row[ours]), source.unit),
-                origin: Origin::Modelled,
-                command: format!("pgs model --section {}", source.section),
-                shown: anchor(table),
-            });
+            let subject: Vec<String> = names.iter().map(|column| shown(&cells[*column])).collect();
+            let figure = |column: usize| shown(&cells[column]) + source.unit;
+            rows.push(row(source, table, subject.join(", "), figure(recorded), figure(ours)));
         }
     }
     Ok(rows)
+}
+
+fn row(source: &Source, table: &Table, subject: String, recorded: String, ours: String) -> Row {
+    Row {
+        thesis: source.thesis.to_owned(),
+        subject,
+        recorded,
+        ours,
+        origin: Origin::Modelled,
+        command: format!("pgs model --section {}", source.section),
+        shown: anchor(table),
+    }
 }
 
 #[cfg(test)]
@@ -154,5 +170,8 @@ mod tests {
         let cycles = rows.iter().find(|row| row.recorded == "2,062,697").expect("Table 6.4");
         assert_eq!(cycles.subject, "float, packed");
         assert_eq!(cycles.ours, "2,066,606");
+        let words = rows.iter().find(|row| row.thesis.ends_with("4.1")).expect("Table 4.1");
+        assert_eq!(words.ours, "7,423,040 → 3,662,280 words");
+        assert_eq!(words.subject, "PGS input");
     }
 }

@@ -42,7 +42,8 @@ pub(super) fn json(report: &Report) -> Value {
 }
 
 pub(super) fn markdown(report: &Report) -> Result<String, Failure> {
-    let mut text = format!("# The thesis' figures, from our own numbers\n\n{}\n\n", preface(report));
+    let mut text =
+        format!("# The thesis' figures, from our own numbers\n\n{}\n\n", preface(report));
     for origin in Origin::ALL {
         let _ = writeln!(text, "- {} {}: {}", origin.mark(), origin.word(), origin.meaning());
     }

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use step_folder::replace::{Replacement, ReplaceError};
+use step_folder::replace::{ReplaceError, Replacement};
 
 use super::parts::Report;
 use super::{page, text};

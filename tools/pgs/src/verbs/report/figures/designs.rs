@@ -48,9 +48,10 @@ fn figure(
 ) -> Result<Figure, Failure> {
     let groups: Vec<String> = over[0].iter().map(|(name, _)| name.clone()).collect();
     let names = ["GPU, recorded", "GPU, modelled", "CPU, recorded", "CPU, modelled"];
-    let values = over[0].iter().zip(over[1]).map(|((_, gpu), (_, cpu))| {
-        vec![gpu.0, Some(gpu.1), cpu.0, Some(cpu.1)]
-    });
+    let values = over[0]
+        .iter()
+        .zip(over[1])
+        .map(|((_, gpu), (_, cpu))| vec![gpu.0, Some(gpu.1), cpu.0, Some(cpu.1)]);
     let values: Vec<_> = values.collect();
     Ok(Figure {
         id,
@@ -99,8 +100,7 @@ mod tests {
     #[test]
     fn the_models_figures_are_near_the_recorded_ones() {
         for (platform, of) in [(&GPU, 0), (&CPU, 1)] {
-            let recorded =
-                move |design: &Design| [design.speedup.gpu, design.speedup.cpu][of];
+            let recorded = move |design: &Design| [design.speedup.gpu, design.speedup.cpu][of];
             for (name, (printed, ours)) in beside(platform, recorded, speedup) {
                 let near = printed.is_none_or(|printed| (ours / printed - 1.0).abs() < 0.02);
                 assert!(near, "{name}: {printed:?} and {ours}");

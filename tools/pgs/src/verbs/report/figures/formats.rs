@@ -5,6 +5,7 @@ use super::super::document::{Figure, Origin, Part, Row};
 use super::super::step::Step;
 use crate::failure::Failure;
 use crate::narrow::NarrowFormat;
+use crate::numbers::grouped;
 use crate::verbs::formats::{EACH_ONCE, Loss, Sizes, numbers};
 
 /// Bins of a decade of magnitudes.
@@ -69,18 +70,19 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
             title: title.to_owned(),
             svg: lines(x, count, &series)?,
             caption: format!(
-                "{} numbers that {} gives the solver, four bins a decade; {} are 0 and not shown.",
-                values.len(),
+                "{} numbers of {}, four bins a decade; {} are 0 and not shown.",
+                grouped(values.len() as u64),
                 step.name,
-                sizes.zeros
+                grouped(sizes.zeros)
             ),
             origin: Origin::Measured,
         })
     };
     let error_axis = Axis::log("error, % of the number");
-    let all = thinned(errors.iter().copied(), errors.len());
-    let cut: Vec<(f64, f64)> = errors.iter().copied().filter(|error| error.1 < CUT).collect();
+    let (cut, high): (Vec<_>, Vec<_>) = errors.iter().copied().partition(|error| error.1 < CUT);
     let cut_dots = thinned(cut.iter().copied(), cut.len());
+    let mut all = cut_dots.clone();
+    all.extend(thinned(high.iter().copied(), high.len()));
     let scatter = |id, thesis, title: &str, dots, caption: String| -> Result<Figure, Failure> {
         let series = [Series::new("error", Drawn::Dots, dots)];
         let svg = lines(x, error_axis, &series)?;
@@ -95,7 +97,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
             "Figure 4.7",
             "Error of binary16 on all input numbers",
             all,
-            "Each dot is a number, one of many shown. Below 6.1e-5 binary16 has subnormal numbers, and \
+            "Each dot is a number; all large errors are shown, and one of many small ones. Below 6.1e-5 binary16 has subnormal numbers, and \
              the relative error grows; numbers that binary16 holds exactly have no error and no dot."
                 .to_owned(),
         )?,

@@ -1,8 +1,6 @@
 //! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
 
-use zynq_pgs::order::{
-    InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve,
-};
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve};
 
 use super::super::chart::{Axis, Drawn, Series, lines};
 use super::super::document::{Figure, Origin, Part, Row};
@@ -50,7 +48,8 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         most.push((name, alive.iter().copied().max().unwrap_or(0)));
         series.push(Series::new(name, Drawn::Line, thinned(&alive)));
     }
-    let end = series.iter().flat_map(|series| series.points.last()).map(|at| at.0).fold(1.0, f64::max);
+    let end =
+        series.iter().flat_map(|series| series.points.last()).map(|at| at.0).fold(1.0, f64::max);
     let recorded = f64::from(RECORDED);
     series.push(Series::new(
         "1,528, the thesis' largest",
@@ -72,7 +71,9 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
     let ours: Vec<String> = most
         .iter()
         .skip(1)
-        .map(|(name, most)| format!("{} ({})", grouped(u64::from(*most)), name.replace("Algorithm 3, ", "")))
+        .map(|(name, most)| {
+            format!("{} ({})", grouped(u64::from(*most)), name.replace("Algorithm 3, ", ""))
+        })
         .collect();
     let moving = input.moving.iter().filter(|moving| **moving).count();
     let row = Row {

@@ -22,10 +22,12 @@ impl Square {
 
     /// Its shadow on an axis: from, to.
     fn shadow(&self, axis: [f64; 2]) -> (f64, f64) {
-        self.corners().iter().map(|[x, y]| x * axis[0] + y * axis[1]).fold(
-            (f64::INFINITY, f64::NEG_INFINITY),
-            |(low, high), place| (low.min(place), high.max(place)),
-        )
+        self.corners()
+            .iter()
+            .map(|[x, y]| x * axis[0] + y * axis[1])
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), place| {
+                (low.min(place), high.max(place))
+            })
     }
 
     fn axes(&self) -> [[f64; 2]; 2] {
@@ -56,9 +58,8 @@ fn pair(text: &mut String, a: &Square, b: &Square, at: [f64; 2], name: &str) {
     let across = [-axis[1], axis[0]];
     // The axis of the shadows lies below the boxes.
     let offset = -120.0 * if across[1] > 0.0 { 1.0 } else { -1.0 };
-    let on_axis = |t: f64| {
-        place([t * axis[0] + offset * across[0], t * axis[1] + offset * across[1]])
-    };
+    let on_axis =
+        |t: f64| place([t * axis[0] + offset * across[0], t * axis[1] + offset * across[1]]);
     let _ = writeln!(
         text,
         "<polyline points=\"{} {}\" fill=\"none\" stroke=\"currentColor\"/>",
@@ -86,12 +87,8 @@ fn pair(text: &mut String, a: &Square, b: &Square, at: [f64; 2], name: &str) {
             let (low, high) = (a.shadow(axis), b.shadow(axis));
             if low.1 < high.0 { (low.1 + high.0) / 2.0 } else { (high.1 + low.0) / 2.0 }
         };
-        let on_plane = |t: f64| {
-            place([
-                middle * axis[0] + t * across[0],
-                middle * axis[1] + t * across[1],
-            ])
-        };
+        let on_plane =
+            |t: f64| place([middle * axis[0] + t * across[0], middle * axis[1] + t * across[1]]);
         let _ = writeln!(
             text,
             "<polyline points=\"{} {}\" fill=\"none\" stroke=\"#D55E00\" stroke-dasharray=\"7 5\" \
@@ -135,7 +132,10 @@ pub(crate) fn part() -> Part {
         thesis: "§2.2.2, Figure 2.8".to_owned(),
         subject: "separating axis test".to_owned(),
         recorded: "shadows apart: no collision; overlap on every axis: collision".to_owned(),
-        ours: format!("gap {:+.0} (apart), {:+.0} (intersecting), drawn to scale", gaps[0], gaps[1]),
+        ours: format!(
+            "gap {:+.0} (apart), {:+.0} (intersecting), drawn to scale",
+            gaps[0], gaps[1]
+        ),
         origin: Origin::Modelled,
         command: "pgs report".to_owned(),
         shown: figure.id.to_owned(),
