@@ -22,6 +22,7 @@ mod narrow;
 mod numbers;
 mod options;
 mod output;
+mod power;
 mod step_input;
 mod verbs;
 
