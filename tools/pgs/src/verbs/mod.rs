@@ -13,6 +13,7 @@ pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
+pub(crate) mod study;
 
 use std::io::Write;
 
@@ -31,6 +32,7 @@ use self::report::ReportArgs;
 use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
+use self::study::StudyArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 
@@ -45,6 +47,7 @@ pub(crate) enum Verb {
     Model(ModelArgs),
     Order(OrderArgs),
     Report(ReportArgs),
+    Study(StudyArgs),
     List(ListArgs),
     Load(LoadArgs),
     Serve(ServeArgs),
@@ -64,6 +67,7 @@ impl Verb {
             Self::Model(args) => model::run(args, common, out),
             Self::Order(args) => order::run(args, common, out),
             Self::Report(args) => report::run(args, common, out),
+            Self::Study(args) => study::run(args, common, out),
             Self::List(args) => list::run(args, common, out),
             Self::Load(args) => load::run(args, common, out),
             Self::Serve(args) => serve::run(args, common, out),
