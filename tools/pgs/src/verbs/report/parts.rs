@@ -8,7 +8,7 @@ use super::figures;
 use super::step::Step;
 use super::studies::Effort;
 use super::tables;
-use crate::common::CommonArgs;
+use crate::common::{BoardName, CommonArgs};
 use crate::failure::Failure;
 use crate::verbs::model::table::Table;
 use crate::verbs::model::thesis_tables;
@@ -32,6 +32,12 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
     }
+    // Whatever the machine has: the report measures steps of the emulated board.
+    let mut common = common.clone();
+    if common.board == BoardName::Auto {
+        common.board = BoardName::Emulated;
+    }
+    let common = &common;
     let about = |what: &'static str| {
         bar.set_message(what);
         bar.tick();

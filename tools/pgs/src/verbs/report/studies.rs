@@ -130,6 +130,9 @@ pub(super) fn below(histogram: &Histogram) -> Vec<(f64, f64)> {
     let mut points = Vec::with_capacity(edges_percent.len());
     for (edge, count) in edges_percent.iter().zip(counts.iter().chain([above])) {
         points.push((*edge, share(sum)));
+        if sum == all {
+            break;
+        }
         sum += count;
     }
     points
