@@ -18,7 +18,7 @@ use step_folder::npy::{self, Dimensions};
 const GPU_ORDER: &str = "gpu_order.npy";
 /// The name of Bullet's GPU order.
 const GPU: &str = "gpu";
-/// What a random order begins with; its seed follows.
+/// The beginning of a random order; its seed follows.
 const RANDOM: &str = "random=";
 
 /// An order that the command makes.

@@ -1,5 +1,5 @@
-//! `pgs study`: its figures are those of single runs, calculated here from their results, and with
-//! `PGS_VECTORS` on the thesis' scene those that were measured outside this project.
+//! `pgs study`: its figures agree with single runs, whose results are compared here by hand, and with
+//! `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
 
 use std::fs;
 use std::path::Path;
