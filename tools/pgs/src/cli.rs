@@ -88,9 +88,9 @@ pub(crate) fn parse(
 /// The common options that a verb reads.
 fn reads(verb: &Verb) -> Reads {
     Reads {
-        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_)),
+        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_) | Verb::Study(_)),
         emulated_memory: matches!(verb, Verb::Serve(_)),
-        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_)),
+        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_) | Verb::Study(_)),
         accelerator: match verb {
             Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
                 true

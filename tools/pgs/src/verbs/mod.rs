@@ -12,6 +12,7 @@ pub(crate) mod order;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
+pub(crate) mod study;
 
 use std::io::Write;
 
@@ -29,6 +30,7 @@ use self::order::OrderArgs;
 use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
+use self::study::StudyArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 
@@ -40,6 +42,7 @@ pub(crate) enum Verb {
     Compare(CompareArgs),
     Detect(DetectArgs),
     Formats(FormatsArgs),
+    Study(StudyArgs),
     Model(ModelArgs),
     Order(OrderArgs),
     List(ListArgs),
@@ -58,6 +61,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args, common, out),
             Self::Detect(args) => detect::run(args, common, out),
             Self::Formats(args) => formats::run(args, common, out),
+            Self::Study(args) => study::run(args, common, out),
             Self::Model(args) => model::run(args, common, out),
             Self::Order(args) => order::run(args, common, out),
             Self::List(args) => list::run(args, common, out),
