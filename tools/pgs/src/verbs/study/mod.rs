@@ -1,26 +1,27 @@
-//! The verb `study`: answers one question of the thesis with a series of runs or of models.
+//! The verb `study`: measures again the claims of the thesis.
+//!
+//! Each study is a function from its options to its outcome, which other verbs can call, and a part
+//! that shows the outcome.
 
-mod emulated;
 pub(crate) mod ladder;
+mod session;
+pub(crate) mod split;
+pub(crate) mod stopping;
+pub(crate) mod time_step;
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::common::{BoardName, CommonArgs};
-use crate::failure::{Cause, Failure, Verdict};
+pub(crate) use self::session::Session;
+use crate::common::CommonArgs;
+use crate::failure::{Failure, Verdict};
 use crate::output::SCHEMA;
 
-const EXAMPLES: &str = "\
-Examples:
-  pgs study ladder                     each design of the thesis, and its factor on the one before";
-
-/// Answer one question of the thesis with a series of runs or of models.
+/// Measure again the claims of the thesis: time steps, stopping rules, shares of a step, designs.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
 pub(crate) struct StudyArgs {
     #[command(subcommand)]
     study: Study,
@@ -29,55 +30,61 @@ pub(crate) struct StudyArgs {
 /// A study and its options.
 #[derive(Debug, Clone, Subcommand)]
 enum Study {
+    TimeStep(time_step::Options),
+    Stopping(stopping::Options),
+    Split(split::Options),
     Ladder(ladder::Options),
 }
 
-/// Measures, and shows the outcome.
+/// Measures and shows the outcome.
 pub(crate) fn run(
     args: &StudyArgs,
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
-        let error = "`pgs study` builds its boards itself and cannot use a real one";
-        return Err(Failure::input(error).next("leave out --board"));
-    }
-    let progress = emulated::bar();
-    let json = common.json;
-    match &args.study {
-        Study::Ladder(options) => answer(
-            "ladder",
-            json,
-            ladder::measure(options, &progress),
-            &progress,
-            ladder::show,
-            out,
-        ),
-    }
+    let session = Session::new(common);
+    let complete = match &args.study {
+        Study::TimeStep(options) => {
+            let outcome = time_step::measure(options, &session)?;
+            match common.json {
+                true => write(out, "time-step", &outcome)?,
+                false => time_step::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Stopping(options) => {
+            let outcome = stopping::measure(options, &session)?;
+            match common.json {
+                true => write(out, "stopping", &outcome)?,
+                false => stopping::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Split(options) => {
+            let outcome = split::measure(options, &session)?;
+            match common.json {
+                true => write(out, "split", &outcome)?,
+                false => split::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Ladder(options) => {
+            let outcome = ladder::measure(options);
+            match common.json {
+                true => write(out, "ladder", &outcome)?,
+                false => ladder::show(&outcome, out)?,
+            }
+            true
+        }
+    };
+    Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
-/// Writes an outcome as a document or as text.
-fn answer<O: Serialize>(
-    study: &str,
-    json: bool,
-    outcome: Result<O, Failure>,
-    progress: &ProgressBar,
-    show: fn(&O, &mut dyn Write) -> io::Result<()>,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
-    progress.finish_and_clear();
-    let outcome = outcome?;
-    if json {
-        let mut document =
-            serde_json::to_value(&outcome).map_err(|error| Failure::new(Cause::Output, error))?;
-        if let Value::Object(keys) = &mut document {
-            keys.insert("schema".to_owned(), SCHEMA.into());
-            keys.insert("verb".to_owned(), "study".into());
-            keys.insert("study".to_owned(), study.into());
-        }
-        writeln!(out, "{document:#}")?;
-    } else {
-        show(&outcome, out)?;
-    }
-    Ok(Verdict::Done)
+/// Writes the document for programs.
+fn write(out: &mut dyn Write, study: &str, outcome: &impl Serialize) -> Result<(), Failure> {
+    let mut document = serde_json::to_value(outcome).map_err(Failure::input)?;
+    document["schema"] = SCHEMA.into();
+    document["verb"] = "study".into();
+    document["study"] = Value::from(study);
+    Ok(writeln!(out, "{document:#}")?)
 }
