@@ -19,6 +19,8 @@ Examples:
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
+  pgs study determinism --input vectors/full_step186
+  pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check                            test the board; with --board emulated the emulated one
@@ -88,14 +90,14 @@ pub(crate) fn parse(
 /// The common options that a verb reads.
 fn reads(verb: &Verb) -> Reads {
     Reads {
-        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_) | Verb::Study(_)),
+        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_)),
         emulated_memory: matches!(verb, Verb::Serve(_)),
-        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_) | Verb::Study(_)),
+        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_)),
         accelerator: match verb {
             Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
                 true
             }
-            Verb::Compare(_) => true,
+            Verb::Compare(_) | Verb::Study(_) => true,
             // The step of a folder is measured without taking it.
             Verb::Formats(args) => args.takes_steps(),
             _ => false,

@@ -16,12 +16,14 @@ mod difference;
 mod environment;
 mod failure;
 mod footprint;
+mod histogram;
 mod interrupt;
 mod loading;
 mod narrow;
 mod numbers;
 mod options;
 mod output;
+mod permutation;
 mod step_input;
 mod verbs;
 

@@ -33,6 +33,7 @@ use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
+use crate::permutation::Permutation;
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -43,6 +44,7 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
+  pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     without extensions of 1.2
@@ -150,7 +152,8 @@ impl RunArgs {
         let shown = shown && !self.wide;
         let wanted = self.beside_cold.unwrap_or(shown);
         let scene = || self.scene.build(&self.build.build());
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
+        let arranger = self.ordering.arranger(None);
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
     }
 }
 
@@ -214,10 +217,12 @@ fn take_steps(
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
+    let mut arranger = args.ordering.arranger(None);
     while course.done < args.steps() && !interrupt.is_set() {
-        let row =
-            step(course.done + 1, parameters, &mut opened.accelerator, scene, memory.as_mut())
-                .map_err(|error| args.faults.failure(opened, parameters, error))?;
+        let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
+        let accelerator = &mut opened.accelerator;
+        let row = step(course.done + 1, parameters, accelerator, scene, memory, arranger)
+            .map_err(|error| args.faults.failure(opened, parameters, error))?;
         opened.alive()?;
         let Some(row) = row else { break };
         let mut beside = None;
@@ -284,7 +289,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &order::with_reason(first))?;
+    fact(out, "order", &order::with_reason(first, args.ordering.permutation()))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
@@ -360,6 +365,7 @@ fn document(
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
     config["spin_damping"] = parameters.spin_damping.into();
+    config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
     config["shape_friction"] = parameters.shape_friction.into();

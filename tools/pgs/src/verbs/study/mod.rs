@@ -3,9 +3,15 @@
 //! Each study is a function from its options to its outcome, which other verbs can call, and a part
 //! that shows the outcome.
 
+pub(crate) mod determinism;
+pub(crate) mod half;
 pub(crate) mod ladder;
+mod recorded;
+mod run;
 mod session;
 pub(crate) mod split;
+mod spread;
+mod start;
 pub(crate) mod stopping;
 pub(crate) mod time_step;
 
@@ -20,7 +26,8 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::output::SCHEMA;
 
-/// Measure again the claims of the thesis: time steps, stopping rules, shares of a step, designs.
+/// Measure again the claims of the thesis: time steps, stopping rules, orders, number formats, the
+/// shares of a step, and the ladder of designs.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct StudyArgs {
     #[command(subcommand)]
@@ -33,6 +40,8 @@ enum Study {
     TimeStep(time_step::Options),
     Stopping(stopping::Options),
     Split(split::Options),
+    Determinism(determinism::Options),
+    Half(half::Options),
     Ladder(ladder::Options),
 }
 
@@ -65,6 +74,22 @@ pub(crate) fn run(
             match common.json {
                 true => write(out, "split", &outcome)?,
                 false => split::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Determinism(options) => {
+            let outcome = determinism::measure(options, &session)?;
+            match common.json {
+                true => write(out, "determinism", &outcome)?,
+                false => determinism::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Half(options) => {
+            let outcome = half::measure(options, &session)?;
+            match common.json {
+                true => write(out, "half", &outcome)?,
+                false => half::show(&outcome, out)?,
             }
             outcome.complete
         }
