@@ -19,6 +19,7 @@ Examples:
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
+  pgs report --out report              the thesis' tables and figures again
   pgs study determinism --input vectors/full_step186
   pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json

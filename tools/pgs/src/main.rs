@@ -24,6 +24,7 @@ mod numbers;
 mod options;
 mod output;
 mod permutation;
+mod power;
 mod step_input;
 mod verbs;
 

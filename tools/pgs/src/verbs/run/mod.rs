@@ -1,6 +1,7 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod beside;
+mod energy;
 mod row;
 mod summary;
 
@@ -170,6 +171,8 @@ struct Course {
     last: Option<Row>,
     /// The scene beside it.
     cold: Option<Cold>,
+    /// The energy of a step, for people and for programs.
+    energy: Option<(String, Value)>,
 }
 
 /// Steps the scene.
@@ -192,8 +195,10 @@ pub(crate) fn run(
     let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
 
+    let meter = energy::start(is_emulated(&opened));
     let scenes = (&mut scene, &mut course);
     take_steps(args, common, &parameters, &mut opened, scenes, &interrupt, out)?;
+    course.energy = Some(energy::end(meter, course.done, course.totals.mean()));
     let complete = course.done == args.steps();
     if common.json {
         let document = document(args, &parameters, &opened, &mut scene, course, complete);
@@ -339,6 +344,9 @@ fn print_end(
     if let Some(summary) = summary(args, parameters, opened, scene, course) {
         summary.print(out)?;
     }
+    if let Some((energy, _)) = &course.energy {
+        fact(out, "energy", energy)?;
+    }
     if let Some(cold) = cold {
         fact(out, "cold", &cold)?;
     }
@@ -383,6 +391,7 @@ fn document(
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
         "beside_cold": cold,
+        "energy": course.energy.as_ref().map(|(_, energy)| energy),
         "faults": opened.faults_json(),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },

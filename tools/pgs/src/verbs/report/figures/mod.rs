@@ -1,0 +1,7 @@
+//! The figures of the thesis, drawn again from our own numbers; one file for each subject.
+
+pub(super) mod designs;
+pub(super) mod euler;
+pub(super) mod formats;
+pub(super) mod live;
+pub(super) mod separation;

@@ -1,0 +1,53 @@
+//! Gathers the parts of the report, with progress.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::ReportArgs;
+use super::document::Part;
+use super::figures;
+use super::step::Step;
+use super::tables;
+use crate::common::CommonArgs;
+use crate::failure::Failure;
+use crate::verbs::model::table::Table;
+use crate::verbs::model::thesis_tables;
+
+/// Everything that the report shows.
+#[derive(Debug)]
+pub(super) struct Report {
+    /// The step that was measured.
+    pub(super) step: String,
+    /// The step is a folder's.
+    pub(super) given: bool,
+    pub(super) quick: bool,
+    pub(super) part: Part,
+    pub(super) tables: Vec<Table>,
+}
+
+/// Measures and draws all parts.
+pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, Failure> {
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    let about = |what: &'static str| {
+        bar.set_message(what);
+        bar.tick();
+    };
+    about("the step to measure");
+    let step = match &args.input {
+        Some(path) => Step::folder(path)?,
+        None => Step::of_pile(args, common, || bar.tick())?,
+    };
+    let tables = thesis_tables();
+    let mut part = figures::euler::part()?;
+    part.append(figures::separation::part());
+    about("the input in 16 bits");
+    part.append(figures::formats::part(&step)?);
+    about("the live bodies of each order");
+    part.append(figures::live::part(&step)?);
+    part.append(figures::designs::part()?);
+    part.rows.extend(tables::rows(&tables)?);
+    bar.finish_and_clear();
+    Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part, tables })
+}
