@@ -27,4 +27,5 @@ mod run;
 mod saturated;
 mod serve;
 mod signals;
+mod study_more;
 mod threads;

@@ -1,16 +1,17 @@
 //! The study `split`: the shares of collision search and collision response in a step (thesis §4.4: 40
 //! and 60 %), and the gain of the whole step when the response alone becomes faster (equation 6.5).
 //!
-//! Both shares are measured on this host, on one thread: the search is the detection that `pgs run`
-//! times, the response is the yardstick, a sequential solver with Bullet's bits. The time of the
+//! Both shares are measured on this host, in processor time of one thread: the search is the detection
+//! of `pgs run`, the response is the yardstick, a sequential solver with Bullet's bits. The time of the
 //! board is modelled.
 
 use std::io::{self, Write};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bitstream_model::estimate::thesis::amdahl;
 use bitstream_model::estimate::thesis::recorded::{ACCELERATED_SHARE, CPU, DESIGNS, GPU};
 use clap::Args;
+use nix::time::{ClockId, clock_gettime};
 use scene::{Grid, Scene, SceneOptions};
 use serde::Serialize;
 use yardstick::Yardstick;
@@ -19,7 +20,7 @@ use zynq_pgs::{StepParameters, StepReport};
 
 use super::Session;
 use crate::board;
-use crate::failure::Failure;
+use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
 use crate::options::scenes;
 use crate::output::facts::fact;
@@ -31,11 +32,12 @@ Examples:
   pgs study split                      the thesis' scene
   pgs study split --grid 12x12x12 --steps 90 --runs 15 --json
 
-Measured: medians over successive steps of a pile, on one thread of this host. Search is the
-detection of this project (a grid, then cubes against cubes), response the yardstick: a sequential
-scalar solver with Bullet's bits, that makes its rows, takes the passes and integrates. The times of
-a busy host differ from run to run. Driver: the host's time around the board's, for checks, order,
-packing and results. Modelled: the board's time, at the bandwidth that a ZCU102 sustains.
+Measured: medians over successive steps of a pile, in processor time of one thread, which a busy
+host changes less than time by the clock. Search is the detection of this project (a grid, then cubes
+against cubes), response the yardstick: a sequential scalar solver with Bullet's bits, that makes its
+rows, takes the passes and integrates, in memory that an unmeasured run has touched. Driver: time by
+the clock around the board's, for checks, order, packing and results. Modelled: the board's time, at
+the bandwidth that a ZCU102 sustains.
 
 Whole step: 1 / ((1 - p) + p / s) (thesis eq. 6.5), with s the factor of the response and p its
 share: the thesis' 0.6, or the measured one.";
@@ -65,7 +67,7 @@ pub(crate) struct Outcome {
     pub(crate) grid: String,
     pub(crate) drop_m: f32,
     pub(crate) bodies: usize,
-    /// Of the last measured step.
+    /// In the last measured step.
     pub(crate) collisions: usize,
     /// Medians; none if Ctrl-C came before the first measured step.
     pub(crate) median: Option<Times>,
@@ -83,14 +85,8 @@ pub(crate) struct Outcome {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct Times {
     pub(crate) search_ms: f64,
-    pub(crate) broad_ms: f64,
-    pub(crate) narrow_ms: f64,
     pub(crate) response_ms: f64,
-    pub(crate) rows_ms: f64,
-    pub(crate) contact_ms: f64,
-    pub(crate) friction_ms: f64,
-    pub(crate) integration_ms: f64,
-    /// The driver's host time.
+    /// The driver's host time, by the clock.
     pub(crate) driver_ms: f64,
     /// Modelled.
     pub(crate) board_ms: f64,
@@ -126,11 +122,11 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         if session.is_interrupted() {
             break;
         }
-        let begin = Instant::now();
-        scene.detect();
-        let search = begin.elapsed();
-        let response = (step >= options.steps.into()).then(|| respond(&scene, &parameters));
-        let found = scene.detection_times();
+        let search = spent(|| {
+            scene.detect();
+        })?;
+        let is_measured = step >= options.steps.into();
+        let response = is_measured.then(|| respond(&scene, &parameters)).transpose()?;
         let (bodies, collisions) = scene.parts_mut();
         let report = match opened.accelerator.step(bodies, collisions, &parameters) {
             Ok(report) => report,
@@ -138,16 +134,10 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
             Err(error) => return Err(opened.failure(error)),
         };
         session.advance();
-        if let Some(stages) = response {
+        if let Some(response) = response {
             samples.push(Times {
                 search_ms: milliseconds(search),
-                broad_ms: milliseconds(found.broad),
-                narrow_ms: milliseconds(found.narrow),
-                response_ms: milliseconds(stages.total()),
-                rows_ms: milliseconds(stages.rows),
-                contact_ms: milliseconds(stages.contact),
-                friction_ms: milliseconds(stages.friction),
-                integration_ms: milliseconds(stages.integration),
+                response_ms: milliseconds(response),
                 driver_ms: milliseconds(driver(&report)),
                 board_ms: milliseconds(report.modelled_time()),
             });
@@ -175,9 +165,28 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
     })
 }
 
-/// The yardstick's times for the step.
-fn respond(scene: &Scene, parameters: &StepParameters) -> yardstick::Stages {
-    Yardstick::new(scene.shapes(), scene.bodies(), scene.collisions(), parameters).solve()
+/// The yardstick's time for the step.
+fn respond(scene: &Scene, parameters: &StepParameters) -> Result<Duration, Failure> {
+    let (shapes, bodies) = (scene.shapes(), scene.bodies());
+    let mut yardstick = Yardstick::new(shapes, bodies, scene.collisions(), parameters);
+    yardstick.solve();
+    spent(|| {
+        yardstick.solve();
+    })
+}
+
+/// Processor time that this thread spends.
+fn spent(act: impl FnOnce()) -> Result<Duration, Failure> {
+    let now = || {
+        clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).map(Duration::from).map_err(|error| {
+            Failure::new(Cause::Hardware, error)
+                .about("the processor time of a thread cannot be read")
+                .next("run the study on another system")
+        })
+    };
+    let begin = now()?;
+    act();
+    Ok(now()?.saturating_sub(begin))
 }
 
 /// The driver's host time, without the wait for the board.
@@ -200,13 +209,7 @@ impl Times {
         };
         Some(Self {
             search_ms: of(|times| times.search_ms)?,
-            broad_ms: of(|times| times.broad_ms)?,
-            narrow_ms: of(|times| times.narrow_ms)?,
             response_ms: of(|times| times.response_ms)?,
-            rows_ms: of(|times| times.rows_ms)?,
-            contact_ms: of(|times| times.contact_ms)?,
-            friction_ms: of(|times| times.friction_ms)?,
-            integration_ms: of(|times| times.integration_ms)?,
             driver_ms: of(|times| times.driver_ms)?,
             board_ms: of(|times| times.board_ms)?,
         })
@@ -268,13 +271,7 @@ pub(crate) fn show(outcome: &Outcome, out: &mut dyn Write) -> io::Result<()> {
     let whole = times.search_ms + times.response_ms;
     let rows = [
         ("search (measured)", times.search_ms, true),
-        ("  broad phase", times.broad_ms, true),
-        ("  narrow phase", times.narrow_ms, true),
         ("response (measured, yardstick)", times.response_ms, true),
-        ("  rows", times.rows_ms, true),
-        ("  contact passes", times.contact_ms, true),
-        ("  friction passes", times.friction_ms, true),
-        ("  integration", times.integration_ms, true),
         ("driver of the board (measured)", times.driver_ms, false),
         ("board (modelled)", times.board_ms, false),
     ];
@@ -314,18 +311,7 @@ mod tests {
     use super::*;
 
     fn times(search_ms: f64, response_ms: f64) -> Times {
-        Times {
-            search_ms,
-            broad_ms: 1.0,
-            narrow_ms: 1.0,
-            response_ms,
-            rows_ms: 1.0,
-            contact_ms: 1.0,
-            friction_ms: 1.0,
-            integration_ms: 1.0,
-            driver_ms: 5.0,
-            board_ms: 10.0,
-        }
+        Times { search_ms, response_ms, driver_ms: 5.0, board_ms: 10.0 }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use bitstream_model::interface::profile::{
 /// Cycles of a register access (thesis §5.2: 30 to 50 for each request), least and most.
 const ACCESS_CYCLES: [u64; 2] = [30, 50];
 
-/// Rows of the velocities that a collision reads, and as many that it writes back.
+/// Rows of the velocities that a collision reads; it writes the same rows back.
 const ROWS: u32 = 2;
 
 /// Cycles that the velocities' block RAM takes for a collision if each of their words is a row of its

@@ -1,10 +1,9 @@
 //! The study `ladder`: the designs of the thesis' chapter 5 one behind the other, and the factor that
 //! each brings.
 //!
-//! A design is a profile where there is one. Where the profile differs in one property from another
-//! design, it is made here from that design, so that all of them go through one formula
-//! ([`StepCycles`]). Two designs have other records, or no streams, and formulae of their own
-//! ([`register_accesses`], [`unreduced_stream`]).
+//! A design is a profile where there is one. A design that differs in few properties from a profile is
+//! made from it, so that all of them go through one formula. Two designs have other records, or no
+//! streams, and formulae of their own.
 
 mod designs;
 mod show;
@@ -23,7 +22,13 @@ Examples:
 
 Every figure is modelled: by formula, without stalls on hazards; the thesis' cycles stand beside the
 two designs that it measured. Factors are ratios of times, because the clocks differ. Numbers are
-counted as the thesis packs them, without padding.";
+counted as the thesis packs them, without padding.
+
+Streams and ports are the cycles that the streams and the block RAM need for an issue; a design
+takes the larger. Up to four streams each word of a velocity is taken for a row of its own, 24
+accesses a collision on two ports, and from float on a velocity for one row (thesis 5.4.3 tells that
+the arrays were partitioned, and not how they were before). Before the reduction every pass is taken
+to read the 56 words of Table 4.1.";
 
 /// Compare the designs of the thesis' chapter 5, from register accesses to sixteen bits.
 #[derive(Debug, Clone, Args)]

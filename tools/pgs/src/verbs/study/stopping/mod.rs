@@ -86,7 +86,7 @@ pub(crate) struct Outcome {
     pub(crate) contact: Vec<Pass>,
     /// After the step's own contact passes and 0, 1, 2 ... friction passes.
     pub(crate) friction: Vec<Pass>,
-    /// What the step's own passes leave.
+    /// The state after the step's own passes.
     pub(crate) fixed: Option<Pass>,
     pub(crate) tolerances: Vec<Tolerance>,
 }

@@ -75,8 +75,8 @@ impl Course<'_> {
         }))
     }
 
-    /// The velocities and impulses after the passes. Without any, the board is not asked: nothing has
-    /// changed.
+    /// The velocities and impulses after the passes. Without a pass nothing has changed, and the board
+    /// takes no step.
     fn solve(
         &mut self,
         [contact, friction]: [u32; 2],

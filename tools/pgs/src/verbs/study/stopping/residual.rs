@@ -24,9 +24,9 @@ pub(crate) struct Residual {
 /// Both kinds of residual.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub(crate) struct Residuals {
-    /// Of the contacts, by the minimum of both sides.
+    /// The contacts' residual, by the minimum of both sides.
     pub(crate) contact: Residual,
-    /// Of the contacts, by the Fischer-Burmeister function of both sides.
+    /// The same by the Fischer-Burmeister function of both sides.
     pub(crate) fischer_burmeister: Residual,
     pub(crate) friction: Residual,
 }
@@ -44,7 +44,7 @@ pub(super) struct Row {
     bias: f64,
 }
 
-/// What a row acts along.
+/// The direction of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     /// The normal, at this point.

@@ -4,7 +4,7 @@
 //! Two scenes, each for the same simulated time: a body in free flight, whose exact path is known, and
 //! a pile of cubes. The board integrates both.
 
-use std::io::{self, Write};
+mod show;
 
 use clap::Args;
 use scene::{Grid, Scene, SceneOptions};
@@ -12,13 +12,11 @@ use serde::Serialize;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
+pub(super) use self::show::show;
 use super::Session;
 use crate::board::{self, OpenBoard};
 use crate::failure::Failure;
-use crate::numbers::{grouped, number};
 use crate::options::scenes;
-use crate::output::facts::fact;
-use crate::output::table::{Column, heading, line};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -57,7 +55,7 @@ pub(crate) struct Options {
     /// Simulated time, s.
     #[arg(long, value_name = "S", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=60))]
     pub(crate) seconds: u16,
-    /// Contact iterations, and as many friction iterations.
+    /// Contact iterations, and the same number of friction iterations.
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=255))]
     pub(crate) iterations: u32,
 }
@@ -316,61 +314,6 @@ fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let sum = a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + distance(*a, *b));
     // The ground, which all runs share, does not move.
     sum / (a.len().saturating_sub(1) as f64).max(1.0)
-}
-
-const FLIGHT: [Column; 4] = [
-    Column { name: "dt", unit: "s", width: 6 },
-    Column { name: "explicit", unit: "mm off", width: 10 },
-    Column { name: "symplectic", unit: "mm off", width: 10 },
-    Column { name: "board", unit: "mm off", width: 10 },
-];
-
-const PILE: [Column; 8] = [
-    Column { name: "dt", unit: "s", width: 6 },
-    Column { name: "steps", unit: "", width: 6 },
-    Column { name: "deepest", unit: "mm", width: 9 },
-    Column { name: "at end", unit: "mm", width: 9 },
-    Column { name: "kinetic", unit: "J at end", width: 10 },
-    Column { name: "distance", unit: "m", width: 9 },
-    Column { name: "cycles", unit: "a second", width: 13 },
-    Column { name: "board", unit: "ms/second", width: 10 },
-];
-
-/// Shows both scenes.
-pub(crate) fn show(outcome: &Outcome, out: &mut dyn Write) -> io::Result<()> {
-    let Outcome { grid, drop_m, seconds, iterations, rows, .. } = outcome;
-    let millimetres = |metres: f64| number(metres * 1e3);
-    let dt = |row: &Row| format!("1/{}", row.steps_per_second);
-    fact(out, "flight", &format!("{seconds} s, thrown at 3 m/s sideways and 8 m/s up"))?;
-    writeln!(out)?;
-    heading(out, &FLIGHT)?;
-    for row in rows {
-        let Flight { explicit_m, symplectic_m, board_m } = row.flight;
-        let off = [explicit_m, symplectic_m, board_m].map(millimetres);
-        line(out, &FLIGHT, [dt(row)].into_iter().chain(off))?;
-    }
-    writeln!(out)?;
-    let text = format!(
-        "{grid} cubes dropped from {drop_m} m, {seconds} s, {iterations} + {iterations} iterations"
-    );
-    fact(out, "pile", &text)?;
-    writeln!(out)?;
-    heading(out, &PILE)?;
-    for row in rows {
-        let pile = &row.pile;
-        let cells = [
-            dt(row),
-            grouped(pile.steps.into()),
-            format!("{:.1}", pile.deepest_m * 1e3),
-            format!("{:.1}", pile.deepest_at_end_m * 1e3),
-            number(pile.kinetic_at_end_j),
-            number(pile.distance_from_shortest_m),
-            format!("{:.3e}", pile.cycles_per_second),
-            format!("{:.2}", pile.board_ms_per_second),
-        ];
-        line(out, &PILE, cells)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]
