@@ -26,9 +26,21 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::output::SCHEMA;
 
+const EXAMPLES: &str = "\
+Examples:
+  pgs study time-step
+  pgs study stopping --input vectors/pile5_step60
+  pgs study split
+  pgs study determinism --input vectors/full_step186
+  pgs study half --input vectors/full_step186
+  pgs study ladder --json
+
+`pgs study NAME --help` tells how each one measures.";
+
 /// Measure again the claims of the thesis: time steps, stopping rules, orders, number formats, the
 /// shares of a step, and the ladder of designs.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct StudyArgs {
     #[command(subcommand)]
     study: Study,
