@@ -34,8 +34,8 @@ fn the_board_falls_as_explicit_euler_and_a_longer_step_costs_less() {
         for (number, sample) in samples.iter().enumerate() {
             near(&sample["seconds"], number as f64 / 15.0, 1e-12);
         }
-        // Eight cubes of 1 kg: two layers, 2.2 m apart, the lower one 2 m up.
-        near(&samples[0]["potential_j"], 9.8 * 4.0 * (2.0 + 4.2), 1e-2);
+        // Eight cubes of 1 kg and 2 m in two layers, their centres 2 m and 4 m up.
+        near(&samples[0]["potential_j"], 9.8 * 4.0 * (2.0 + 4.0), 1e-2);
     }
     near(&rows[0]["pile"]["distance_from_shortest_m"], 0.0, 0.0);
     let costs: Vec<f64> =
