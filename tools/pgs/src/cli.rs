@@ -21,6 +21,7 @@ Examples:
   pgs order --input vectors/full_step186
   pgs report --out report              the thesis' tables and figures again
   pgs study determinism --input vectors/full_step186
+  pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check                            test the board; with --board emulated the emulated one
