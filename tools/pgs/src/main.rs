@@ -23,6 +23,7 @@ mod numbers;
 mod options;
 mod output;
 mod step_input;
+mod traced;
 mod verbs;
 
 use std::io::{self, Write};
