@@ -28,3 +28,4 @@ mod saturated;
 mod serve;
 mod signals;
 mod threads;
+mod traced;
