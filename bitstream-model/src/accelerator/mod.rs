@@ -231,6 +231,11 @@ impl Accelerator {
         }
     }
 
+    /// The board's clock at which the accelerator has sent last, if it is watched.
+    pub(crate) fn sent_at(&self) -> Option<u64> {
+        self.stages.as_ref().map(|stages| stages.sent_at())
+    }
+
     /// The stages that have ended since they are watched, and watches no more.
     pub(crate) fn take_stages(&mut self) -> Vec<StageSpan> {
         self.stages.take().map_or_else(Vec::new, |stages| stages.finish())

@@ -320,6 +320,11 @@ impl Board {
             let deferral = self.short_cut.as_mut().map(|short_cut| short_cut.defer());
             let (faults, memory) = (&mut self.faults, &self.memory);
             let ran = self.accelerator.run(limit, inputs, outputs, faults, memory, deferral);
+            if let (Some(recorder), Some(sent)) =
+                (&mut self.recorder, self.accelerator.model.sent_at())
+            {
+                recorder.sent_at(sent);
+            }
             let waits = ran.cycles == 0;
             let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
             if waits && ran.progressed {

@@ -44,7 +44,7 @@ pub struct Recording {
     pub doorbells: Vec<u64>,
     /// The MM2S channels, and then the S2MM channels.
     pub channels: Vec<ChannelRecording>,
-    /// The stages of the accelerator; none of one that is not the built-in model.
+    /// The stages of the accelerator, if it is the built-in model.
     pub stages: Vec<StageSpan>,
     /// Clocks in which the accelerator waited for beats or for room. It looks for both every few
     /// clocks, so that a wait is a multiple of that time.

@@ -18,6 +18,13 @@ struct Channel {
     packet: Option<u64>,
 }
 
+impl Channel {
+    /// The clock after the last beat so far.
+    fn end_of_beats(&self) -> u64 {
+        self.recording.port.last().map_or(0, PortState::end_of_beats)
+    }
+}
+
 /// A recording under way.
 #[derive(Debug)]
 pub(crate) struct Recorder {
@@ -29,6 +36,9 @@ pub(crate) struct Recorder {
     /// MM2S and S2MM of each core, in that order.
     channels: Vec<Channel>,
     waits: Vec<Span>,
+    /// The clock at which the accelerator has sent last. It works first in a slice of the board's time, and
+    /// the channels then move its beats from the begin of the slice on: no beat moves before it exists.
+    sent_at: u64,
     level: bool,
     interrupt: Levels,
 }
@@ -60,6 +70,7 @@ impl Recorder {
             doorbells: Vec::new(),
             channels: (0..cores).flat_map(both).map(channel).collect(),
             waits: Vec::new(),
+            sent_at: begin,
             level,
             interrupt: Levels { first: level, edges: Vec::new() },
         }
@@ -95,6 +106,11 @@ impl Recorder {
         }
     }
 
+    /// The accelerator has sent at a clock.
+    pub(crate) fn sent_at(&mut self, now: u64) {
+        self.sent_at = self.sent_at.max(now);
+    }
+
     /// Beats of a channel move, from a clock on, each for `clocks`.
     pub(crate) fn moves(
         &mut self,
@@ -103,8 +119,10 @@ impl Recorder {
         (beats, clocks): (u64, u64),
         last: bool,
     ) {
+        let exists = if direction == Direction::S2mm { self.sent_at } else { 0 };
         let Channel { recording: ChannelRecording { port, .. }, packet, .. } =
             self.channel(core, direction);
+        let begin = begin.max(exists).max(port.last().map_or(0, PortState::end_of_beats));
         packet.get_or_insert(begin);
         // A rest of no clocks was none.
         port.pop_if(|state| state.begin >= begin && matches!(state.port, Port::Rests { .. }));
@@ -145,7 +163,9 @@ impl Recorder {
         now: u64,
         address: u64,
     ) {
-        self.channel(core, direction).descriptor = Some((now, address));
+        let channel = self.channel(core, direction);
+        let before = channel.recording.descriptors.last().map_or(0, |last| last.span.end);
+        channel.descriptor = Some((now.max(before), address));
     }
 
     pub(crate) fn descriptor_ends(
@@ -156,7 +176,7 @@ impl Recorder {
     ) {
         let channel = self.channel(core, direction);
         if let Some((begin, address)) = channel.descriptor.take() {
-            let span = Span { begin, end: now };
+            let span = Span { begin, end: now.max(channel.end_of_beats()) };
             channel.recording.descriptors.push(DescriptorSpan { span, address, bytes });
         }
     }
@@ -170,7 +190,7 @@ impl Recorder {
     ) {
         let channel = self.channel(core, direction);
         if let Some(begin) = channel.packet.take() {
-            let span = Span { begin, end: now };
+            let span = Span { begin, end: now.max(channel.end_of_beats()) };
             channel.recording.packets.push(PacketSpan { span, phase, beats, descriptors });
         }
     }
@@ -210,6 +230,7 @@ pub(crate) struct StageCounts {
 pub(crate) struct StageLog {
     /// The board's clock at the start of the step.
     start: u64,
+    sent_at: u64,
     /// The stage under way, its first clock, and the counters there.
     current: Option<(Stage, u64, StageCounts)>,
     ended: Vec<StageSpan>,
@@ -237,6 +258,16 @@ impl StageLog {
             });
         }
         self.current = stage.map(|stage| (stage, now, counts));
+    }
+
+    /// The accelerator sends, `clock` clocks after the start of the step.
+    pub(crate) fn sends(&mut self, clock: u64) {
+        self.sent_at = self.start + clock;
+    }
+
+    /// The board's clock at which the accelerator has sent last; 0 before that.
+    pub(crate) fn sent_at(&self) -> u64 {
+        self.sent_at
     }
 
     /// The stages that have ended.

@@ -135,7 +135,7 @@ fn the_stages_follow_one_another_and_share_the_counters() {
     assert_eq!(sum(|stage| stage.hazards), hazards);
     assert_eq!(sum(|stage| stage.waits), waits);
     assert_eq!(waited.iter().map(|span| span.clocks()).sum::<u64>(), waits);
-    // A friction pass streams the collisions of a contact pass in as many clocks or more.
+    // A collision takes a clock or more.
     assert!(stages[1..6].iter().all(|stage| stage.span.clocks() >= 90 && stage.stalls > 0));
 }
 
@@ -159,9 +159,14 @@ fn the_interrupt_rises_once_after_the_last_beat_and_the_accesses_are_all_there()
     assert!(recording.accesses.ends_with(&last[last.len() - 20..]));
     assert!(!recording.interrupt.first);
     let rise = recording.interrupt.edges[0];
+    let sends = recording.stages.last().expect("the integration");
+    assert_eq!(sends.stage, Stage::Integrate);
     let results = recording.channels.iter().filter(|one| one.direction == Direction::S2mm);
     let end = results.flat_map(|one| &one.packets).map(|packet| packet.span.end).max();
     assert!(end.is_some_and(|end| end <= rise), "{end:?} {rise}");
+    let results = recording.channels.iter().filter(|one| one.direction == Direction::S2mm);
+    let begin = results.flat_map(|one| &one.packets).map(|packet| packet.span.begin).min();
+    assert!(begin.is_some_and(|begin| sends.span.begin <= begin), "{begin:?} {sends:?}");
     assert_eq!(recording.interrupt.edges.len().div_ceil(2) as u64, after.interrupts);
 }
 

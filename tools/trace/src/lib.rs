@@ -23,7 +23,7 @@ pub struct TracedStep<'a> {
     pub recording: &'a Recording,
     /// The name of the board's design.
     pub design: &'a str,
-    /// The driver's report; none of a step that failed.
+    /// The driver's report, unless the step failed.
     pub report: Option<&'a StepReport>,
 }
 

@@ -126,7 +126,7 @@ impl TracedStep<'_> {
             ),
             None => " that failed".to_owned(),
         };
-        format!("One step{of}: {}", self.design)
+        format!("One step{of}, on design {}", self.design)
     }
 
     fn notes(&self) -> [String; 2] {
@@ -198,10 +198,11 @@ impl TracedStep<'_> {
         let [begin, board, end, whole] = [0.0, scale.pack, scale.pack + scale.board, scale.whole()]
             .map(|time| scale.place(time));
         for (from, to, name) in [(begin, board, "pack"), (end, whole, "unpack")] {
-            let place = [from, TOP, to - from, CPU_HEIGHT];
-            picture.rectangle("cpu", place, Some(name));
-            picture.label(place, &[name]);
+            picture.rectangle("cpu", [from, TOP, to - from, CPU_HEIGHT], Some(name));
         }
+        picture.label([begin, TOP, board - begin, CPU_HEIGHT], &["pack"]);
+        let below = TOP + CPU_HEIGHT + 14.0;
+        picture.text("s", [RIGHT, below], Anchor::End, "unpack");
         // A register access ends with its clock.
         for access in &self.recording.accesses {
             let begin = access.cycle.saturating_sub(self.recording.access_clocks);
@@ -219,9 +220,8 @@ impl TracedStep<'_> {
         }
         let (accesses, bells) = (self.recording.accesses.len(), self.recording.doorbells.len());
         let text = format!("{accesses} register accesses, {bells} of them doorbells (arrows)");
-        let y = TOP + CPU_HEIGHT + 14.0;
-        picture.text("s", [board, y], Anchor::Start, &text);
-        y + GAP + 4.0
+        picture.text("s", [board, below], Anchor::Start, &text);
+        below + GAP + 4.0
     }
 
     fn draw_channel(
