@@ -30,3 +30,4 @@ mod signals;
 mod study;
 mod study_more;
 mod threads;
+mod traced;
