@@ -1,6 +1,7 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod beside;
+mod files;
 mod row;
 mod summary;
 
@@ -13,6 +14,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
+use self::files::{FileArgs, Film, Written};
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
 use crate::board::{self, OpenBoard};
@@ -50,6 +52,8 @@ Examples:
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
+  pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
+  pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -109,6 +113,8 @@ pub(crate) struct RunArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    files: FileArgs,
 }
 
 impl RunArgs {
@@ -167,6 +173,8 @@ struct Course {
     last: Option<Row>,
     /// The scene beside it.
     cold: Option<Cold>,
+    /// The poses for the files.
+    film: Option<Film>,
 }
 
 /// Steps the scene.
@@ -175,6 +183,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    args.files.check()?;
     let build = args.build.build();
     let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
@@ -188,17 +197,48 @@ pub(crate) fn run(
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
+    course.film = args.files.film(&scene, args.steps(), parameters.time_step);
 
     let scenes = (&mut scene, &mut course);
     take_steps(args, common, &parameters, &mut opened, scenes, &interrupt, out)?;
     let complete = course.done == args.steps();
+    let written = write_files(args, &opened, &scene, &mut course)?;
     if common.json {
-        let document = document(args, &parameters, &opened, &mut scene, course, complete);
+        let mut document = document(args, &parameters, &opened, &mut scene, course, complete);
+        for file in written {
+            document["files"][file.label] = file.document;
+        }
         writeln!(out, "{document:#}")?;
     } else {
         print_end(args, &parameters, &opened, &mut scene, &mut course, out)?;
+        for file in written {
+            fact(out, file.label, &file.text)?;
+        }
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+}
+
+/// Writes the files of the poses, and the picture.
+fn write_files(
+    args: &RunArgs,
+    opened: &OpenBoard,
+    scene: &Scene,
+    course: &mut Course,
+) -> Result<Vec<Written>, Failure> {
+    let mut written = Vec::new();
+    if let Some(film) = &mut course.film {
+        film.end(course.done, scene);
+        let digest = digest::of_bodies(scene.bodies());
+        let facts = [
+            ("scene", args.scene.text()),
+            ("board", opened.accelerator.board().to_string()),
+            ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
+            ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
+        ];
+        written = args.files.write(film, &args.scene.text(), &facts)?;
+    }
+    written.extend(args.files.write_picture(scene)?);
+    Ok(written)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.
@@ -228,6 +268,9 @@ fn take_steps(
             opened.alive()?;
         }
         course.done += 1;
+        if let Some(film) = &mut course.film {
+            film.step(course.done, scene);
+        }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
         course.footprint.include(&variant, &row.report);
