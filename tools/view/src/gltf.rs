@@ -129,7 +129,7 @@ pub fn binary(recording: &Recording) -> Result<Vec<u8>, TooLarge> {
     Ok(file)
 }
 
-/// What a document has besides its buffer.
+/// The parts of a document's JSON.
 #[derive(Debug)]
 struct Parts {
     views: Vec<View>,
@@ -174,7 +174,7 @@ fn document(recording: &Recording) -> Result<(Parts, Vec<u8>), TooLarge> {
     Ok((Parts { views, accessors, meshes, nodes, samplers, channels }, buffer))
 }
 
-/// The material of the ground; those of the bodies follow.
+/// The material of the ground, the first of all.
 const GROUND_MATERIAL: usize = 0;
 
 /// The top of the ground.

@@ -35,15 +35,18 @@ impl Mesh {
                 Self::of_rings(&capsule(half_height, radius))
             }
             Geometry::Cylinder { half_height, radius } => {
-                let ring = |radius, y, normal| Ring { radius, y, normal };
-                Self::of_rings(&[
-                    ring(0.0, -half_height, [0.0, -1.0]),
-                    ring(radius, -half_height, [0.0, -1.0]),
-                    ring(radius, -half_height, [1.0, 0.0]),
-                    ring(radius, half_height, [1.0, 0.0]),
-                    ring(radius, half_height, [0.0, 1.0]),
-                    ring(0.0, half_height, [0.0, 1.0]),
-                ])
+                let ring = |y| Ring { radius, y, normal: [1.0, 0.0] };
+                let mut mesh = Self::of_rings(&[ring(-half_height), ring(half_height)]);
+                for (y, up) in [(-half_height, -1.0), (half_height, 1.0)] {
+                    let mut cap: Vec<u16> = around(radius)
+                        .map(|[x, z]| mesh.corner([x, y, z], [0.0, up, 0.0]))
+                        .collect();
+                    if up > 0.0 {
+                        cap.reverse();
+                    }
+                    mesh.faces.push(cap);
+                }
+                mesh
             }
         }
     }
@@ -73,25 +76,16 @@ impl Mesh {
         let mut mesh = Self::default();
         let mut below: Option<(Ring, Vec<u16>)> = None;
         for ring in rings {
-            let corners: Vec<u16> = (0..SIDES)
-                .map(|side| {
-                    let turn = f32::from(side) / f32::from(SIDES) * std::f32::consts::TAU;
-                    let (sine, cosine) = (libm::sinf(turn), libm::cosf(turn));
-                    let [outwards, up] = ring.normal;
-                    mesh.corner(
-                        [ring.radius * cosine, ring.y, ring.radius * sine],
-                        [outwards * cosine, up, outwards * sine],
-                    )
-                })
-                .collect();
+            let [outwards, up] = ring.normal;
+            let directions = around(outwards).map(|[x, z]| [x, up, z]);
+            let places = around(ring.radius).map(|[x, z]| [x, ring.y, z]);
+            let corners: Vec<u16> =
+                places.zip(directions).map(|(place, normal)| mesh.corner(place, normal)).collect();
             if let Some((lower, low)) = &below {
                 for side in 0..corners.len() {
                     let next = (side + 1) % corners.len();
-                    // Two rings at one place only change the normal; a ring at a pole is one corner.
-                    let is_same = lower.y.to_bits() == ring.y.to_bits()
-                        && lower.radius.to_bits() == ring.radius.to_bits();
+                    // A ring at a pole is one corner.
                     match (lower.radius > 0.0, ring.radius > 0.0) {
-                        _ if is_same => {}
                         (true, true) => mesh.faces.push(vec![
                             low[side],
                             corners[side],
@@ -119,6 +113,14 @@ impl Mesh {
             last.windows(2).map(|pair| [face[0], pair[0], pair[1]])
         })
     }
+}
+
+/// Points x, z of a circle about the y axis, from x to z.
+fn around(radius: f32) -> impl Iterator<Item = [f32; 2]> {
+    (0..SIDES).map(move |side| {
+        let turn = f32::from(side) / f32::from(SIDES) * std::f32::consts::TAU;
+        [radius * libm::cosf(turn), radius * libm::sinf(turn)]
+    })
 }
 
 /// The six faces of a box.

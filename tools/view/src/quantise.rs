@@ -1,7 +1,7 @@
 //! Makes poses small: whole numbers, differences between frames, and a general compression.
 //!
-//! A position is a whole number of quanta from the lowest corner of all positions. Of a quaternion
-//! the three smallest components are kept, and which one was the largest. A speed is the distance
+//! A position is a whole number of quanta from the lowest corner of all positions. A quaternion
+//! is its three smallest components and the index of the largest. A speed is the distance
 //! from the last frame over the time between: 0 below [`REST`], otherwise the root of its share of
 //! the largest speed. The page's `decode.js` undoes each step.
 //!
@@ -84,9 +84,9 @@ impl Scale {
 
     fn numbers(self, pose: &Pose) -> Numbers {
         let mut numbers = [0; 6];
-        for axis in 0..3 {
-            let offset = f64::from(pose.position[axis]) - f64::from(self.low[axis]);
-            numbers[axis] = whole(offset / self.quantum, POSITION_MOST);
+        for (number, (value, low)) in numbers.iter_mut().zip(pose.position.iter().zip(self.low)) {
+            let offset = f64::from(*value) - f64::from(low);
+            *number = whole(offset / self.quantum, POSITION_MOST);
         }
         let q = pose.orientation.map(f64::from);
         let mut largest = 0;
@@ -121,8 +121,8 @@ impl Scale {
     fn error(self, pose: &Pose, numbers: Numbers) -> Error {
         let (position, q) = self.pose(numbers);
         let mut distance = 0.0;
-        for axis in 0..3 {
-            let difference = position[axis] - f64::from(pose.position[axis]);
+        for (found, exact) in position.iter().zip(pose.position) {
+            let difference = found - f64::from(exact);
             distance += difference * difference;
         }
         let exact = pose.orientation.map(f64::from);

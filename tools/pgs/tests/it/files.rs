@@ -24,8 +24,16 @@ fn a_run_writes_the_files_that_it_names() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let [poses, view, picture] =
         ["poses.npz", "view.html", "picture.png"].map(|name| folder.path().join(name));
-    let files =
-        ["--poses", text(&poses), "--view", text(&view), "--picture", text(&picture), "--every", "3"];
+    let files = [
+        "--poses",
+        text(&poses),
+        "--view",
+        text(&view),
+        "--picture",
+        text(&picture),
+        "--every",
+        "3",
+    ];
     let document = ran(&[&files[..], &["--json"]].concat()).json();
     // The start, steps 3 and 6, and the last one.
     let written = &document["files"];
@@ -81,5 +89,9 @@ fn a_file_that_cannot_be_written_is_refused_before_the_run() {
     refused("--poses", "poses.csv", &["expected a name that ends in .npz or .glb or .gltf"]);
     refused("--view", "view", &["expected a name that ends in .html"]);
     refused("--picture", "a.jpg", &["expected a name that ends in .png or .svg"]);
-    refused("--view", "missing/view.html", &["expected a folder to write", "next: make the folder"]);
+    refused(
+        "--view",
+        "missing/view.html",
+        &["expected a folder to write", "next: make the folder"],
+    );
 }

@@ -1,4 +1,4 @@
-// Leaves out bodies that others hide: a software renderer takes long for triangles that nobody sees.
+// Leaves out bodies that others hide: a software renderer takes long for triangles that are not seen.
 //
 // The picture is divided into cells. From near to far, a body whose cells are all covered is left out; any
 // other one covers the cells that lie within a disc about its centre, where the body has no gap.

@@ -1,6 +1,6 @@
 //! Writes a recording as one HTML page that plays it, without a network.
 //!
-//! The page's parts are the files beside this module; their data is what `quantise` made of the poses.
+//! The page's parts are the files beside this module; their data comes from `quantise`.
 
 use scene::Geometry;
 use serde_json::{Value, json};
@@ -34,7 +34,7 @@ pub struct Page {
     pub error: Error,
 }
 
-/// Makes the page; `facts` are labels with what they say of the run.
+/// Makes the page; `facts` are labels and texts about the run.
 #[must_use]
 pub fn page(recording: &Recording, title: &str, facts: &[(&str, String)]) -> Page {
     let found = quantise::quantise(recording);
@@ -99,7 +99,7 @@ fn view(recording: &Recording) -> ([f32; 3], [f32; 3]) {
     ([0, 1, 2].map(|axis| most(axis, -1.0)), [0, 1, 2].map(|axis| most(axis, 1.0)))
 }
 
-/// What the page draws for a geometry: a box by its size, all others by triangles; and the radii of
+/// The surface that the page draws for a geometry: a box by its size, all others by triangles; and the radii of
 /// the balls inside and around it.
 fn kind(geometry: &Geometry) -> Value {
     let mesh = Mesh::of(geometry);
@@ -128,7 +128,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The template with each `{{name}}` replaced; what is filled in is not looked at again.
+/// The template with each `{{name}}` replaced; values are not searched for further names.
 fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = template;

@@ -45,7 +45,7 @@ pub struct PictureError {
     source: png::EncodingError,
 }
 
-/// What to draw.
+/// A picture to draw.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
     /// The bodies; one whose shape has no geometry is not drawn.
@@ -61,7 +61,7 @@ pub struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// Pixels of a picture whose size nobody chose.
+    /// Pixels of a picture of the usual size.
     const SIZE: [u16; 2] = [1200, 720];
 
     /// A picture of the usual size.

@@ -10,7 +10,7 @@ pub(super) struct Raster {
     pixels: Vec<Pixel>,
 }
 
-/// What is nearest at a pixel.
+/// The nearest face at a pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pixel {
     /// The inverse of its distance; 0 without a face.

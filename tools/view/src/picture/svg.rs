@@ -15,14 +15,14 @@ const UNITS: u16 = 2;
 impl Picture<'_> {
     /// The picture as SVG.
     ///
-    /// Hidden faces are left out. What remains is painted from far to near, which is exact for bodies
+    /// Hidden faces are left out. The others are painted from far to near, which is exact for bodies
     /// that do not intersect much.
     #[must_use]
     pub fn svg(&self) -> String {
         let [width, height] = [self.width, self.height].map(|length| length.saturating_mul(UNITS));
         let view = View::new(self.camera, width, height);
         let mut raster = Raster::new(width, height);
-        let mut seen: Vec<(Face, u32)> = Vec::new();
+        let mut seen: Vec<Face> = Vec::new();
         let mut number = 0;
         // The first time all faces are drawn, the second time the seen ones are kept.
         faces::for_each(self.bodies, self.geometries, &view, |face| {
@@ -35,20 +35,18 @@ impl Picture<'_> {
         }
         let mut counts = counts.into_iter().skip(1);
         faces::for_each(self.bodies, self.geometries, &view, |face| {
-            let count = counts.next().unwrap_or(0);
-            if count >= SEEN {
-                seen.push((face, count));
+            if counts.next().is_some_and(|count| count >= SEEN) {
+                seen.push(face);
             }
         });
-        seen.sort_by(|(one, _), (other, _)| depth(one).total_cmp(&depth(other)));
+        seen.sort_by(|one, other| depth(one).total_cmp(&depth(other)));
 
         let mut text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-             stroke-width=\"{}\" stroke-linejoin=\"round\">\n\
+             stroke-linejoin=\"round\">\n\
              <path fill=\"#dfe3e8\" d=\"M0 0H{width}V{height}H0z\"/>\n",
-            1
         );
-        for (face, _) in &seen {
+        for face in &seen {
             path(&mut text, face);
         }
         text.push_str("</svg>\n");
@@ -71,13 +69,14 @@ fn path(text: &mut String, face: &Face) {
         byte(sum / count)
     });
     let is_flat = face.colours.iter().all(|colour| colour.map(byte) == mean);
-    // Three digits: steps of 17.
-    let digit = |value: u8, share: f32| byte(f32::from(value) * share / 17.0).min(15);
-    let [r, g, b] = mean.map(|value| digit(value, 1.0));
     // Flat faces have an outline; the parts of a round one join without.
     let share = if is_flat { 0.6 } else { 1.0 };
-    let [sr, sg, sb] = mean.map(|value| digit(value, share));
-    let _ = write!(text, "<path fill=\"#{r:x}{g:x}{b:x}\" stroke=\"#{sr:x}{sg:x}{sb:x}\" d=\"");
+    let [r, g, b] = mean;
+    let [sr, sg, sb] = mean.map(|value| byte(share * f32::from(value)));
+    let _ = write!(
+        text,
+        "<path fill=\"#{r:02x}{g:02x}{b:02x}\" stroke=\"#{sr:02x}{sg:02x}{sb:02x}\" d=\""
+    );
     let mut last = [0, 0];
     for (index, corner) in face.corners.iter().enumerate() {
         let [x, y] = [unit(corner[0]), unit(corner[1])];
@@ -113,7 +112,7 @@ mod tests {
         let picture = Picture::of_all(scene.bodies(), scene.geometries());
         let text = picture.svg();
         let faces = text.matches("<path").count() - 1;
-        // Three sides of 25 faces, and parts of those behind the gaps.
+        // Three sides of 25 faces, and faces that show through the gaps.
         assert!((75..250).contains(&faces), "{faces}");
         assert!(
             text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 2400 1440\"")
