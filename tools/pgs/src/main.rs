@@ -16,13 +16,17 @@ mod difference;
 mod environment;
 mod failure;
 mod footprint;
+mod histogram;
 mod interrupt;
 mod loading;
 mod narrow;
 mod numbers;
 mod options;
 mod output;
+mod permutation;
+mod power;
 mod step_input;
+mod traced;
 mod verbs;
 
 use std::io::{self, Write};
