@@ -78,7 +78,7 @@ impl Error {
     #[must_use]
     pub fn text(&self) -> String {
         format!(
-            "largest error from rounding {:.1} mm and {:.2} degrees",
+            "largest error from rounding {:.2} mm and {:.2} degrees",
             1e3 * self.distance,
             self.angle
         )
