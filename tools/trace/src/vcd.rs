@@ -200,7 +200,7 @@ impl TracedStep<'_> {
                 values[signal.0].clone_from(value);
             }
         }
-        let end = changes.keys().next_back().map_or(0, |last| last + 1);
+        let end = changes.keys().next_back().copied().unwrap_or_default();
         writeln!(out, "#{}", self.picoseconds(end.max(self.recording.span.end)))
     }
 }
