@@ -1,6 +1,7 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod beside;
+mod energy;
 mod row;
 mod summary;
 
@@ -33,6 +34,7 @@ use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
+use crate::permutation::Permutation;
 use crate::traced::{TracedArgs, Tracing};
 use step_folder::digest;
 
@@ -44,6 +46,7 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
+  pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     without extensions of 1.2
@@ -171,7 +174,8 @@ impl RunArgs {
         let shown = shown && !self.wide;
         let wanted = self.beside_cold.unwrap_or(shown);
         let scene = || self.scene.build(&self.build.build());
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
+        let arranger = self.ordering.arranger(None);
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
     }
 }
 
@@ -188,6 +192,8 @@ struct Course {
     last: Option<Row>,
     /// The scene beside it.
     cold: Option<Cold>,
+    /// The energy of a step, for people and for programs.
+    energy: Option<(String, Value)>,
 }
 
 /// Steps the scene.
@@ -211,9 +217,11 @@ pub(crate) fn run(
     let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
 
+    let meter = energy::start(is_emulated(&opened));
     let scenes = (&mut scene, &mut course);
     let with = (&parameters, tracing.as_ref());
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
+    course.energy = Some(energy::end(meter, course.done, course.totals.mean()));
     let complete = course.done == args.steps();
     if common.json {
         let document = document(args, &parameters, &opened, &mut scene, course, complete);
@@ -237,13 +245,15 @@ fn take_steps(
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
+    let mut arranger = args.ordering.arranger(None);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
         let tracing = tracing.filter(|(_, step)| *step == number).map(|(tracing, _)| tracing);
         if let Some(tracing) = tracing {
             tracing.begin();
         }
-        let row = step(number, parameters, &mut opened.accelerator, scene, memory.as_mut());
+        let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
+        let row = step(number, parameters, &mut opened.accelerator, scene, memory, arranger);
         if let Some(tracing) = tracing {
             let row = row.as_ref().ok().and_then(Option::as_ref);
             tracing.end(row.map(|row| &row.report))?;
@@ -315,7 +325,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &order::with_reason(first))?;
+    fact(out, "order", &order::with_reason(first, args.ordering.permutation()))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
@@ -365,6 +375,9 @@ fn print_end(
     if let Some(summary) = summary(args, parameters, opened, scene, course) {
         summary.print(out)?;
     }
+    if let Some((energy, _)) = &course.energy {
+        fact(out, "energy", energy)?;
+    }
     if let Some(cold) = cold {
         fact(out, "cold", &cold)?;
     }
@@ -391,6 +404,7 @@ fn document(
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
     config["spin_damping"] = parameters.spin_damping.into();
+    config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
     config["shape_friction"] = parameters.shape_friction.into();
@@ -408,6 +422,7 @@ fn document(
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
         "beside_cold": cold,
+        "energy": course.energy.as_ref().map(|(_, energy)| energy),
         "faults": opened.faults_json(),
         "traced": args.traced.to_json(),
         "memory": course.footprint.to_json(),
