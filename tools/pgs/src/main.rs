@@ -26,6 +26,7 @@ mod output;
 mod permutation;
 mod power;
 mod step_input;
+mod traced;
 mod verbs;
 
 use std::io::{self, Write};

@@ -97,9 +97,10 @@ const BEHIND_SIGN: u32 = 15;
 /// Bits of an f32's mantissa.
 const F32_MANTISSA: u32 = 23;
 
-/// The exponent of the smallest number of a split.
+/// The exponent of the smallest number of a split; f32 has no normal number below.
 pub(crate) fn lowest_exponent(bits: u32, top: i32) -> i32 {
-    top.saturating_add(1).saturating_sub_unsigned(1 << bits.min(BEHIND_SIGN))
+    let lowest = top.saturating_add(1).saturating_sub_unsigned(1 << bits.min(BEHIND_SIGN));
+    lowest.max(f32::MIN_EXP - 1)
 }
 
 /// Cut off, and not below the smallest number.

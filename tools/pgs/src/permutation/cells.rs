@@ -1,8 +1,8 @@
 //! Orders collisions as Bullet's GPU solver does: by groups of cells that can be solved at the same
 //! time, by cell, and in a cell by batches of pairs without a common body.
 //!
-//! Of the 256 cells of Bullet's own `gpu_order.npy` of the thesis' scene, this order has the same cells
-//! in the same sequence, and in 223 of them the same sequence of collisions.
+//! Bullet's own `gpu_order.npy` of the thesis' scene has 256 cells. This order has the same cells in the
+//! same sequence; 223 cells also have the same sequence of collisions.
 //!
 //! Source: Bullet3OpenCL, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
 

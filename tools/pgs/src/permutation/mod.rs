@@ -17,8 +17,8 @@ use step_folder::npy::{self, Dimensions};
 /// The order of the collisions on Bullet's GPU, if a folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
 /// The name of Bullet's GPU order.
-pub(crate) const GPU: &str = "gpu";
-/// What a random order begins with; its seed follows.
+const GPU: &str = "gpu";
+/// The beginning of a random order; its seed follows.
 const RANDOM: &str = "random=";
 
 /// An order that the command makes.

@@ -228,19 +228,18 @@ pub(super) fn bars(
         let mut from = 0.5;
         for (group, values) in groups.iter().zip(values) {
             let width = f64::from(u32::try_from(names.len()).unwrap_or(u32::MAX));
-            let below = chart.backend_coord(&(from + width / 2.0, 0.0));
-            area.draw(&Text::new(group.as_str(), (below.0, below.1 + 24), centred.clone()))
-                .map_err(failed)?;
+            let name = Text::new(group.clone(), (0, 24), centred.clone());
+            let below = EmptyElement::at((from + width / 2.0, 0.0)) + name;
+            chart.draw_series([below]).map_err(failed)?;
             for (k, value) in values.iter().enumerate() {
                 let colour = COLOURS[k % COLOURS.len()];
                 if let Some(value) = *value {
                     let bar =
                         Rectangle::new([(from + 0.06, 0.0), (from + 0.94, value)], colour.filled());
                     chart.draw_series([bar]).map_err(failed)?;
-                    let top = chart.backend_coord(&(from + 0.5, value));
-                    let text =
-                        Text::new(format!("{value:.2}"), (top.0, top.1 - 3), centred.clone());
-                    area.draw(&text).map_err(failed)?;
+                    let number = Text::new(format!("{value:.2}"), (0, -3), centred.clone());
+                    let above = EmptyElement::at((from + 0.5, value)) + number;
+                    chart.draw_series([above]).map_err(failed)?;
                 }
                 from += 1.0;
             }

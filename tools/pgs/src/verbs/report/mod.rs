@@ -16,6 +16,8 @@ mod parts;
 #[cfg(feature = "report")]
 mod step;
 #[cfg(feature = "report")]
+mod studies;
+#[cfg(feature = "report")]
 mod tables;
 #[cfg(feature = "report")]
 mod text;

@@ -6,11 +6,13 @@ use super::ReportArgs;
 use super::document::Part;
 use super::figures;
 use super::step::Step;
+use super::studies::Effort;
 use super::tables;
-use crate::common::CommonArgs;
+use crate::common::{BoardName, CommonArgs};
 use crate::failure::Failure;
 use crate::verbs::model::table::Table;
 use crate::verbs::model::thesis_tables;
+use crate::verbs::study::Session;
 
 /// Everything that the report shows.
 #[derive(Debug)]
@@ -30,6 +32,12 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
     }
+    // Whatever the machine has: the report measures steps of the emulated board.
+    let mut common = common.clone();
+    if common.board == BoardName::Auto {
+        common.board = BoardName::Emulated;
+    }
+    let common = &common;
     let about = |what: &'static str| {
         bar.set_message(what);
         bar.tick();
@@ -46,6 +54,12 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     part.append(figures::formats::part(&step)?);
     about("the live bodies of each order");
     part.append(figures::live::part(&step)?);
+    let session = Session::new(common);
+    let effort = Effort::new(args, &session);
+    about("orders of the collisions");
+    part.append(figures::orders::part(&effort)?);
+    about("sixteen bits against float");
+    part.append(figures::half::part(&effort)?);
     part.append(figures::designs::part()?);
     part.rows.extend(tables::rows(&tables)?);
     bar.finish_and_clear();

@@ -23,7 +23,6 @@ pub(super) struct Step {
     pub(super) bodies: Vec<Body>,
     pub(super) shapes: Vec<Shape>,
     pub(super) collisions: Vec<Collision>,
-    pub(super) parameters: StepParameters,
 }
 
 #[derive(Debug)]
@@ -34,10 +33,10 @@ enum Options {
 
 impl Step {
     pub(super) fn folder(path: &Path) -> Result<Self, Failure> {
-        let Folder { bodies, shapes, collisions, parameters, .. } = step_input::load(path)?;
+        let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
         let shown = path.display().to_string();
         let name = format!("the step in {shown}");
-        Ok(Self { name, options: Options::Folder(shown), bodies, shapes, collisions, parameters })
+        Ok(Self { name, options: Options::Folder(shown), bodies, shapes, collisions })
     }
 
     /// A step of our own pile, after the steps before it on the emulated board; calls `taken` after
@@ -66,7 +65,6 @@ impl Step {
             bodies: scene.bodies().to_vec(),
             shapes: scene.shapes().to_vec(),
             collisions: scene.collisions().to_vec(),
-            parameters,
         })
     }
 

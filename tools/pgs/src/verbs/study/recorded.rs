@@ -5,9 +5,9 @@ use serde::Serialize;
 /// A comparison of two sets of positions in the thesis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct RecordedDeviation {
-    /// Where it stands.
+    /// Its place in the thesis.
     pub(crate) thesis: &'static str,
-    /// What it compares.
+    /// The two sides of the comparison.
     pub(crate) subject: &'static str,
     /// Mean deviation (eq. 4.1): lowest and highest, the same if one is given.
     pub(crate) mean_percent: [f64; 2],

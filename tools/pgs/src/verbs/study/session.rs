@@ -18,12 +18,10 @@ pub(crate) struct Session {
 impl Session {
     /// Takes over Ctrl-C, and shows the progress on a terminal.
     pub(crate) fn new(common: &CommonArgs) -> Self {
-        let interrupt = Interrupt::install();
-        Self { common: common.clone(), interrupt, bar: progress_bar(0) }
+        Self::within(common, Interrupt::install(), progress_bar(0))
     }
 
     /// A session in a verb that has taken over Ctrl-C, and shows the progress in `bar`.
-    #[allow(dead_code, reason = "for verbs that gather the outcomes of several studies")]
     pub(crate) fn within(common: &CommonArgs, interrupt: Interrupt, bar: ProgressBar) -> Self {
         Self { common: common.clone(), interrupt, bar }
     }

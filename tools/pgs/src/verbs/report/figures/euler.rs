@@ -29,7 +29,7 @@ pub(crate) fn part() -> Result<Part, Failure> {
     let line = |time: u32| (f64::from(time), 0.5 * ACCELERATION * f64::from(time).powi(2));
     let series = [
         Series::new("explicit Euler, dt = 1 s", Drawn::Marked, explicit_1),
-        Series::new("symplectic Euler (the board's), dt = 1 s", Drawn::Marked, symplectic_1),
+        Series::new("symplectic Euler, dt = 1 s", Drawn::Marked, symplectic_1),
         Series::new("explicit Euler, dt = 1/100 s", Drawn::Line, explicit_100),
         Series::new("exact", Drawn::Dashes, (0..=SECONDS).map(line).collect()),
     ];
@@ -39,8 +39,9 @@ pub(crate) fn part() -> Result<Part, Failure> {
         title: "Position of a falling body with different time steps".to_owned(),
         svg: lines(Axis::linear("time, s"), Axis::linear("position, m"), &series)?,
         caption: "The acceleration is 10 m/s². The explicit rule moves a body by the speed at the \
-                  start of a step, the symplectic rule, which Bullet and the board use, by the speed \
-                  at its end: their errors are equal and opposite."
+                  start of a step, the symplectic rule by the speed at its end: their errors are equal \
+                  and opposite. The board moves a body before gravity adds to its speed, which is the \
+                  explicit rule for a body in free flight."
             .to_owned(),
         origin: Origin::Modelled,
     };

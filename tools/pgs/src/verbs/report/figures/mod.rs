@@ -3,5 +3,7 @@
 pub(super) mod designs;
 pub(super) mod euler;
 pub(super) mod formats;
+pub(super) mod half;
 pub(super) mod live;
+pub(super) mod orders;
 pub(super) mod separation;

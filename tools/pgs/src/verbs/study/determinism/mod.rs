@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::histogram::Histogram;
 use crate::options::build::BuildArgs;
 use crate::options::ordering::is_sequential;
-use crate::permutation::{GPU, Permutation};
+use crate::permutation::Permutation;
 pub(super) use show::show;
 
 const EXAMPLES: &str = "\
@@ -251,17 +251,4 @@ fn merged(pairs: &[Comparison]) -> Option<Histogram> {
     let mut all = each.next()?.clone();
     each.for_each(|one| all.include(one));
     Some(all)
-}
-
-impl Outcome {
-    /// The orders of a comparison for people.
-    fn orders(&self, comparison: &Comparison) -> String {
-        let gpu = if comparison.original == GPU {
-            format!("{GPU} ({})", self.gpu_order)
-        } else {
-            String::new()
-        };
-        let original = if gpu.is_empty() { &comparison.original } else { &gpu };
-        format!("{} against {original}", comparison.new)
-    }
 }

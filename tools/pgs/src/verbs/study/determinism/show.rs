@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::super::recorded::RecordedDeviation;
 use super::super::spread::Spread;
-use super::{Outcome, OverPairs, Point};
+use super::{Comparison, Outcome, OverPairs, Point};
 use crate::failure::Failure;
 use crate::histogram::Histogram;
 use crate::numbers::number;
@@ -31,7 +31,10 @@ const ROWS: usize = 12;
 pub(in super::super) fn show(outcome: &Outcome, out: &mut dyn Write) -> Result<(), Failure> {
     let pairs = outcome.pairs.len();
     fact(out, "start", &outcome.start_text)?;
-    fact(out, "gpu", &format!("{}; {pairs} pairs of random orders", outcome.orders(&outcome.gpu)))?;
+    let Comparison { original, new, .. } = &outcome.gpu;
+    let source = outcome.gpu_order;
+    let orders = format!("{new} against {original} ({source}); random orders in pairs: {pairs}");
+    fact(out, "orders", &orders)?;
     writeln!(out)?;
     heading(out, &COLUMNS)?;
     let steps = outcome.gpu.curve.len();

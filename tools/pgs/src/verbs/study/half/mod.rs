@@ -75,7 +75,7 @@ pub(crate) struct Outcome {
 pub(crate) struct OfBuild {
     pub(crate) build: String,
     pub(crate) curve: Vec<Point>,
-    /// The positions after its last step, against those of float.
+    /// The positions after its last step, against float's positions.
     pub(crate) position_histogram: Option<Histogram>,
     /// The step that failed on the board, and why.
     pub(crate) failed: Option<Failed>,
@@ -195,7 +195,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         });
     }
     let mut of_splits = match options.start.input {
-        // The folder's numbers belong to its collisions, which are those before the step.
+        // The folder's collisions belong to the state before the step.
         Some(_) => start.run(None)?,
         None => float.run,
     };

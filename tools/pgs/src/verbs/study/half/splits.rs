@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::narrow::{NarrowFormat, exponent, lowest_exponent};
 use crate::verbs::formats::{Loss, Sizes};
 
-/// Bits of the exponents that are tried; eight are those of f32.
+/// Numbers of exponent bits to try; f32 has eight.
 const EXPONENTS: std::ops::RangeInclusive<u32> = 3..=8;
 /// Bits behind the sign.
 const BITS: u32 = 15;
