@@ -47,21 +47,30 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
         Some(path) => Step::folder(path)?,
         None => Step::of_pile(args, common, || bar.tick())?,
     };
-    let tables = thesis_tables();
-    let mut part = figures::euler::part()?;
-    part.append(figures::separation::part());
-    about("the input in 16 bits");
-    part.append(figures::formats::part(&step)?);
-    about("the live bodies of each order");
-    part.append(figures::live::part(&step)?);
     let session = Session::new(common);
     let effort = Effort::new(args, &session);
+    // In the order of the thesis.
+    about("time steps");
+    let mut part = figures::time_step::part(&effort)?;
+    part.append(figures::euler::part()?);
+    part.append(figures::separation::part());
+    about("stopping rules and shares of a step");
+    part.append(figures::solver::part(&effort)?);
+    let tables = thesis_tables();
+    part.rows.extend(tables::of_chapter_4(&tables)?);
     about("orders of the collisions");
     part.append(figures::orders::part(&effort)?);
-    about("sixteen bits against float");
+    about("the input in 16 bits");
+    part.append(figures::formats::part(&step)?);
+    about("16 bits against float");
     part.append(figures::half::part(&effort)?);
+    about("live bodies of each order");
+    part.append(figures::live::part(&step)?);
+    about("stages of a step");
+    part.append(figures::stages::part(common)?);
+    part.append(figures::ladder::part()?);
     part.append(figures::designs::part()?);
-    part.rows.extend(tables::rows(&tables)?);
+    part.rows.extend(tables::of_chapter_6(&tables)?);
     bar.finish_and_clear();
     Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part, tables })
 }

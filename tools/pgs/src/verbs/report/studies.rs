@@ -5,7 +5,7 @@ use clap::{Args, Command};
 use super::ReportArgs;
 use crate::failure::{Cause, Failure};
 use crate::histogram::Histogram;
-use crate::verbs::study::{Session, determinism, half};
+use crate::verbs::study::{Session, determinism, half, split, stopping, time_step};
 
 /// The outcome of a study.
 #[derive(Debug)]
@@ -110,6 +110,39 @@ impl<'a> Effort<'a> {
 
     pub(super) fn half_of_many_steps(&self) -> Result<Studied<half::Outcome>, Failure> {
         self.half(self.many_steps())
+    }
+}
+
+/// Studies of our own small piles, whatever the step of the report is.
+impl Effort<'_> {
+    pub(super) fn time_steps(&self) -> Result<Studied<time_step::Outcome>, Failure> {
+        let words =
+            words(if self.args.quick { "--grid 4x4x4" } else { "--grid 8x8x8 --seconds 4" });
+        let (command, options) = options::<time_step::Options>("time-step", &words)?;
+        let outcome = time_step::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = format!("{} s of a pile of {} cubes", outcome.seconds, outcome.grid);
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn stopping(&self) -> Result<Studied<stopping::Outcome>, Failure> {
+        let words =
+            words(if self.args.quick { "--passes 32" } else { "--passes 128 --grid 10x10x10" });
+        let (command, options) = options::<stopping::Options>("stopping", &words)?;
+        let outcome = stopping::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = outcome.step.clone();
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn split(&self) -> Result<Studied<split::Outcome>, Failure> {
+        let grid = if self.args.quick { "12x12x12".to_owned() } else { self.args.grid.to_string() };
+        let (command, options) =
+            options::<split::Options>("split", &words(&format!("--grid {grid}")))?;
+        let outcome = split::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = format!("a pile of {} cubes", outcome.grid);
+        Ok(Studied { command, subject, outcome })
     }
 }
 
