@@ -4,7 +4,7 @@
 //! Bullet's own `gpu_order.npy` of the thesis' scene has 256 cells. This order has the same cells in the
 //! same sequence; 223 cells also have the same sequence of collisions.
 //!
-//! Source: Bullet3OpenCL, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
+//! Source: `Bullet3OpenCL`, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
 
 use zynq_pgs::order::OrderInput;
 
@@ -66,8 +66,8 @@ fn batches(input: &OrderInput<'_>, cell: &mut [u32], taken: &mut [u32], batch: &
     let mut done = 0;
     while done < cell.len() {
         *batch += 1;
-        let mut count = 0;
-        for at in done..cell.len() {
+        let (mut count, begin) = (0, done);
+        for at in begin..cell.len() {
             let pair = usize::try_from(cell[at]).ok().and_then(|index| input.pairs.get(index));
             let moving = pair.into_iter().flatten().filter(|body| is_moving(input, **body));
             let bodies: Vec<usize> =
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn cells_that_touch_are_in_different_groups() {
-        let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
+        let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -6.0]];
         let pairs = [[0, 0], [1, 1], [2, 2], [3, 3]];
         let found = order(&input(&pairs, &[true; 4], &positions));
         // Along x cell 0, cell 2, and then cell 1; along z cell 0 before cell 7, which is -1 folded.
