@@ -19,7 +19,9 @@ Examples:
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
+  pgs report --out report              the thesis' tables and figures again
   pgs study determinism --input vectors/full_step186
+  pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check                            test the board; with --board emulated the emulated one

@@ -24,7 +24,9 @@ mod numbers;
 mod options;
 mod output;
 mod permutation;
+mod power;
 mod step_input;
+mod traced;
 mod verbs;
 
 use std::io::{self, Write};

@@ -9,6 +9,7 @@ pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod order;
+pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
@@ -27,6 +28,7 @@ use self::list::ListArgs;
 use self::load::LoadArgs;
 use self::model::ModelArgs;
 use self::order::OrderArgs;
+use self::report::ReportArgs;
 use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
@@ -44,6 +46,7 @@ pub(crate) enum Verb {
     Formats(FormatsArgs),
     Model(ModelArgs),
     Order(OrderArgs),
+    Report(ReportArgs),
     Study(StudyArgs),
     List(ListArgs),
     Load(LoadArgs),
@@ -63,6 +66,7 @@ impl Verb {
             Self::Formats(args) => formats::run(args, common, out),
             Self::Model(args) => model::run(args, common, out),
             Self::Order(args) => order::run(args, common, out),
+            Self::Report(args) => report::run(args, common, out),
             Self::Study(args) => study::run(args, common, out),
             Self::List(args) => list::run(args, common, out),
             Self::Load(args) => load::run(args, common, out),

@@ -25,6 +25,7 @@ use crate::output::order;
 use crate::output::{limit_text, milliseconds};
 use crate::permutation::{self, Permutation};
 use crate::step_input;
+use crate::traced::TracedArgs;
 use step_folder::digest;
 use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use step_folder::npy::{self, Dimensions};
@@ -37,6 +38,7 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs solve vectors/pile10_step90 --out result --digest
   pgs solve vectors/pile10_step90 --hazards unchecked --verify
+  pgs solve vectors/one_cube --vcd step.vcd --trace step.json --timeline step.svg
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
@@ -103,6 +105,8 @@ pub(crate) struct SolveArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    traced: TracedArgs,
 }
 
 impl SolveArgs {
@@ -151,6 +155,7 @@ pub(crate) fn run(
     let mut opened = board::open(common, &args.build.build())?;
     folder.check_shapes(opened.accelerator.capabilities().shapes_max()).map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
+    let tracing = args.traced.tracing(&opened)?;
     opened.inject(&args.planned, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
@@ -163,8 +168,11 @@ pub(crate) fn run(
     };
     let mut arranger = args.ordering.arranger(recorded);
     let accelerator = &mut opened.accelerator;
-    let stepped =
-        step_input::set_shapes(accelerator, &folder.shapes).and_then(|()| match &mut arranger {
+    let stepped = step_input::set_shapes(accelerator, &folder.shapes).and_then(|()| {
+        if let Some(tracing) = &tracing {
+            tracing.begin();
+        }
+        match &mut arranger {
             None => accelerator.step(&mut bodies, &folder.collisions, &parameters),
             Some(arranger) => {
                 let arranged = arranger.arrange(&bodies, &folder.shapes, &folder.collisions);
@@ -181,7 +189,11 @@ pub(crate) fn run(
                     stepped => stepped,
                 }
             }
-        });
+        }
+    });
+    if let Some(tracing) = &tracing {
+        tracing.end(stepped.as_ref().ok())?;
+    }
     if stepped.is_ok() {
         opened.alive()?;
     }
@@ -222,6 +234,7 @@ pub(crate) fn run(
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
         document["faults"] = opened.faults_json();
+        document["traced"] = args.traced.to_json();
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
@@ -232,6 +245,7 @@ pub(crate) fn run(
             writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
+        args.traced.print(out)?;
     }
     if args.digest && !equal {
         for difference in solved.differences.iter().filter(|d| d.differing > 0) {

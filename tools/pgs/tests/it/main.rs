@@ -28,4 +28,6 @@ mod saturated;
 mod serve;
 mod signals;
 mod study;
+mod study_more;
 mod threads;
+mod traced;

@@ -1,15 +1,19 @@
-//! The verb `study`: measures again the claims of the thesis' fourth chapter.
+//! The verb `study`: measures again the claims of the thesis.
 //!
 //! Each study is a function from its options to its outcome, which other verbs can call, and a part
 //! that shows the outcome.
 
 pub(crate) mod determinism;
 pub(crate) mod half;
+pub(crate) mod ladder;
 mod recorded;
 mod run;
 mod session;
+pub(crate) mod split;
 mod spread;
 mod start;
+pub(crate) mod stopping;
+pub(crate) mod time_step;
 
 use std::io::Write;
 
@@ -22,8 +26,21 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::output::SCHEMA;
 
-/// Measure again the claims of the thesis' chapter 4: how far orders and number formats lead apart.
+const EXAMPLES: &str = "\
+Examples:
+  pgs study time-step
+  pgs study stopping --input vectors/pile5_step60
+  pgs study split
+  pgs study determinism --input vectors/full_step186
+  pgs study half --input vectors/full_step186
+  pgs study ladder --json
+
+`pgs study NAME --help` tells how each one measures.";
+
+/// Measure again the claims of the thesis: time steps, stopping rules, orders, number formats, the
+/// shares of a step, and the ladder of designs.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct StudyArgs {
     #[command(subcommand)]
     study: Study,
@@ -32,8 +49,12 @@ pub(crate) struct StudyArgs {
 /// A study and its options.
 #[derive(Debug, Clone, Subcommand)]
 enum Study {
+    TimeStep(time_step::Options),
+    Stopping(stopping::Options),
+    Split(split::Options),
     Determinism(determinism::Options),
     Half(half::Options),
+    Ladder(ladder::Options),
 }
 
 /// Measures and shows the outcome.
@@ -44,6 +65,30 @@ pub(crate) fn run(
 ) -> Result<Verdict, Failure> {
     let session = Session::new(common);
     let complete = match &args.study {
+        Study::TimeStep(options) => {
+            let outcome = time_step::measure(options, &session)?;
+            match common.json {
+                true => write(out, "time-step", &outcome)?,
+                false => time_step::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Stopping(options) => {
+            let outcome = stopping::measure(options, &session)?;
+            match common.json {
+                true => write(out, "stopping", &outcome)?,
+                false => stopping::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
+        Study::Split(options) => {
+            let outcome = split::measure(options, &session)?;
+            match common.json {
+                true => write(out, "split", &outcome)?,
+                false => split::show(&outcome, out)?,
+            }
+            outcome.complete
+        }
         Study::Determinism(options) => {
             let outcome = determinism::measure(options, &session)?;
             match common.json {
@@ -59,6 +104,14 @@ pub(crate) fn run(
                 false => half::show(&outcome, out)?,
             }
             outcome.complete
+        }
+        Study::Ladder(options) => {
+            let outcome = ladder::measure(options);
+            match common.json {
+                true => write(out, "ladder", &outcome)?,
+                false => ladder::show(&outcome, out)?,
+            }
+            true
         }
     };
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
