@@ -89,7 +89,42 @@ fn batches(input: &OrderInput<'_>, cell: &mut [u32], taken: &mut [u32], batch: &
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::path::PathBuf;
+
+    use zynq_pgs::order::InputBuffers;
+
+    use super::super::recorded;
     use super::*;
+    use crate::environment::variable;
+    use crate::step_input;
+
+    #[test]
+    fn the_cells_of_the_full_step_are_those_of_the_gpu() {
+        let root = variable("PGS_VECTORS").map(PathBuf::from);
+        let Some(path) = root.map(|root| root.join("full_step186")).filter(|path| path.exists())
+        else {
+            // With stderr closed, the report is lost and the test goes on.
+            let _ = writeln!(std::io::stderr(), "skipped: the cells of full_step186");
+            return;
+        };
+        let folder = step_input::load(&path).expect("a folder");
+        let theirs = recorded(&path, folder.collisions.len()).expect("an order").expect("the file");
+        let mut buffers = InputBuffers::new();
+        let input = buffers.gather(&folder.bodies, &folder.collisions[..], &folder.shapes);
+        let ours = order(&input);
+        let cell_of =
+            |index: &u32| key(&input, input.pairs[usize::try_from(*index).expect("an index")]);
+        let cells = |order: &[u32]| -> Vec<Vec<u32>> {
+            order.chunk_by(|a, b| cell_of(a) == cell_of(b)).map(<[u32]>::to_vec).collect()
+        };
+        let (theirs, ours) = (cells(&theirs), cells(&ours));
+        let keys =
+            |cells: &[Vec<u32>]| cells.iter().map(|cell| cell_of(&cell[0])).collect::<Vec<_>>();
+        assert_eq!(keys(&ours), keys(&theirs));
+        let same = theirs.iter().zip(&ours).filter(|(theirs, ours)| theirs == ours).count();
+        assert_eq!((ours.len(), same), (256, 223));
+    }
 
     fn input<'a>(
         pairs: &'a [[u32; 2]],
