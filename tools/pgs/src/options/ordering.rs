@@ -22,7 +22,7 @@ pub(crate) struct OrderingArgs {
     pub(crate) verify: bool,
 }
 
-/// An order that is asked for.
+/// An order of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AskedOrder {
     /// One that the driver makes.
@@ -153,7 +153,7 @@ impl OrderingArgs {
         parameters
     }
 
-    /// What puts the collisions in order before the driver gets them, if the command does. `recorded` is
+    /// Puts the collisions in order before the driver gets them, if the command does. `recorded` is
     /// the order of Bullet's GPU, where it is known.
     pub(crate) fn arranger(self, recorded: Option<Vec<u32>>) -> Option<Arranger> {
         self.permutation().map(|permutation| Arranger::new(permutation, recorded))

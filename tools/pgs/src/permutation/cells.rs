@@ -4,7 +4,7 @@
 //! Bullet's own `gpu_order.npy` of the thesis' scene has 256 cells. This order has the same cells in the
 //! same sequence; 223 cells also have the same sequence of collisions.
 //!
-//! Source: Bullet3OpenCL, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
+//! Source: `Bullet3OpenCL`, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
 
 use zynq_pgs::order::OrderInput;
 
@@ -66,8 +66,8 @@ fn batches(input: &OrderInput<'_>, cell: &mut [u32], taken: &mut [u32], batch: &
     let mut done = 0;
     while done < cell.len() {
         *batch += 1;
-        let mut count = 0;
-        for at in done..cell.len() {
+        let (mut count, begin) = (0, done);
+        for at in begin..cell.len() {
             let pair = usize::try_from(cell[at]).ok().and_then(|index| input.pairs.get(index));
             let moving = pair.into_iter().flatten().filter(|body| is_moving(input, **body));
             let bodies: Vec<usize> =
@@ -89,7 +89,42 @@ fn batches(input: &OrderInput<'_>, cell: &mut [u32], taken: &mut [u32], batch: &
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::path::PathBuf;
+
+    use zynq_pgs::order::InputBuffers;
+
+    use super::super::recorded;
     use super::*;
+    use crate::environment::variable;
+    use crate::step_input;
+
+    #[test]
+    fn the_cells_of_the_full_step_are_those_of_the_gpu() {
+        let root = variable("PGS_VECTORS").map(PathBuf::from);
+        let Some(path) = root.map(|root| root.join("full_step186")).filter(|path| path.exists())
+        else {
+            // With stderr closed, the report is lost and the test goes on.
+            let _ = writeln!(std::io::stderr(), "skipped: the cells of full_step186");
+            return;
+        };
+        let folder = step_input::load(&path).expect("a folder");
+        let theirs = recorded(&path, folder.collisions.len()).expect("an order").expect("the file");
+        let mut buffers = InputBuffers::new();
+        let input = buffers.gather(&folder.bodies, &folder.collisions[..], &folder.shapes);
+        let ours = order(&input);
+        let cell_of =
+            |index: &u32| key(&input, input.pairs[usize::try_from(*index).expect("an index")]);
+        let cells = |order: &[u32]| -> Vec<Vec<u32>> {
+            order.chunk_by(|a, b| cell_of(a) == cell_of(b)).map(<[u32]>::to_vec).collect()
+        };
+        let (theirs, ours) = (cells(&theirs), cells(&ours));
+        let keys =
+            |cells: &[Vec<u32>]| cells.iter().map(|cell| cell_of(&cell[0])).collect::<Vec<_>>();
+        assert_eq!(keys(&ours), keys(&theirs));
+        let same = theirs.iter().zip(&ours).filter(|(theirs, ours)| theirs == ours).count();
+        assert_eq!((ours.len(), same), (256, 223));
+    }
 
     fn input<'a>(
         pairs: &'a [[u32; 2]],
@@ -101,7 +136,7 @@ mod tests {
 
     #[test]
     fn cells_that_touch_are_in_different_groups() {
-        let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
+        let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -6.0]];
         let pairs = [[0, 0], [1, 1], [2, 2], [3, 3]];
         let found = order(&input(&pairs, &[true; 4], &positions));
         // Along x cell 0, cell 2, and then cell 1; along z cell 0 before cell 7, which is -1 folded.

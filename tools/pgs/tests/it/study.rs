@@ -68,7 +68,7 @@ fn the_deviation_of_orders_is_that_of_single_steps() {
     }
     let over = &document["over_pairs"][0]["position_mean_percent"];
     near(&over["mean"], f64::midpoint(means[1], means[2]), 1e-9);
-    // Of two values the deviation over n - 1 is their distance by the root of 2.
+    // The deviation over n - 1 of two values is their distance by the root of 2.
     near(&over["standard_deviation"], (means[1] - means[2]).abs() / 2.0_f64.sqrt(), 1e-9);
     near(&document["recorded"][1]["under_1_percent_share"], 0.8429, 0.0);
 }
