@@ -166,7 +166,12 @@ command=$(sed -n 's/^ExecStart=//p' "$root/usr/lib/systemd/system/pgs-serve.serv
 group=$(within getent group pgs | cut -d: -f3)
 in_group() { within setpriv --reuid 65534 --regid "$group" --clear-groups "$@"; }
 install -d -m 750 -o 65534 -g "$group" "$root/run/pgs"
-(umask 007 && in_group $command > "$work/served" 2>&1; echo "ended with $?" >> "$work/served") &
+# shellcheck disable=SC2016 # for the shell within
+(
+	umask 007
+	in_group sh -c "echo \$\$ > /tmp/server; exec $command" > "$work/served" 2>&1
+) &
+server=$!
 waited=0
 until [ -S "$root/run/pgs/board" ]; do
 	[ $((waited += 1)) -le 300 ] || { cat "$work/served"; fail "the unit's command opens no socket"; }
@@ -175,10 +180,8 @@ done
 shows "a served board" "digest" in_group pgs run --board socket:/run/pgs/board --grid 3x3x3 --steps 2
 mode=$(stat -c %a "$root/run/pgs/board")
 [ "$mode" = 770 ] || [ "$mode" = 660 ] || fail "the socket has the rights $mode, and the group needs to write"
-server=$(pgrep -f "/usr/bin/pgs serve --socket /run/pgs/board" | tail -n 1)
-kill -TERM "$server"
-wait %1 || true
-grep -q "ended with 0" "$work/served" || { cat "$work/served"; fail "SIGTERM does not end the server in good order"; }
+kill -TERM "$(cat "$root/tmp/server")"
+wait "$server" || { cat "$work/served"; fail "SIGTERM does not end the server in good order"; }
 [ ! -e "$root/run/pgs/board" ] || fail "the socket stays after SIGTERM"
 echo "ok    SIGTERM ends the server and removes the socket"
 

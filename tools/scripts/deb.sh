@@ -27,7 +27,7 @@ done
 
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 abi=$(sed -n 's/^#define ZPGS_ABI_VERSION //p' tools/capi/include/zynq_pgs.h)
-maintainer=${DEB_MAINTAINER:-the zynq-pgs authors <zynq-pgs@localhost.localdomain>}
+maintainer=${DEB_MAINTAINER:-the zynq-pgs authors <packages@zynq-pgs.invalid>}
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || stat -c %Y Cargo.toml)}
 sources=tools/packages
 packages=$target_root/packages
