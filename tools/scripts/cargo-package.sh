@@ -10,6 +10,7 @@
 # Exit code: 0 done, 1 a package cannot be made or does not build, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+. "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
 
 # The largest package, in bytes: golden vectors or Verilog in a package would be a mistake.
@@ -48,8 +49,8 @@ attend timeout 1800 cargo package --manifest-path "$copy/Cargo.toml" --locked --
 # A test that a package leaves out needs the golden vectors or another crate's binaries.
 ! grep '^warning: ' "$log" | grep -v -E '^warning: ignoring (test|benchmark) ' || fail "cargo warns, as above"
 
-rm -rf "$target_root/packages/crates"
-mkdir -p "$target_root/packages/crates"
+rm -rf "$packages/crates"
+mkdir -p "$packages/crates"
 for crate in "${crates[@]}"; do
 	package=$(echo "$CARGO_TARGET_DIR/package/$crate"-[0-9]*.crate)
 	[ -s "$package" ] || fail "no package of $crate"
@@ -60,7 +61,7 @@ for crate in "${crates[@]}"; do
 	for key in description license rust-version keywords categories documentation; do
 		grep -q "^$key = " <<<"$manifest" || fail "$crate: no $key in its Cargo.toml"
 	done
-	cp "$package" "$target_root/packages/crates"
+	cp "$package" "$packages/crates"
 	echo "$(basename "$package"): $bytes bytes"
 done
 echo "${#crates[@]} crates, ${verify[*]:-each built from its package}"

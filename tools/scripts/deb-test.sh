@@ -10,6 +10,7 @@
 # Exit code: 0 passed, 1 failed, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+. "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
 
 [ $# -le 1 ] || { sed -n '2,/^set /s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
@@ -22,6 +23,8 @@ esac
 foreign=no
 [ "$architecture" = "$(dpkg --print-architecture)" ] || foreign=yes
 
+package=$(debian_package "$architecture")
+
 # Mounts and processes of the test are in namespaces of its own, and end with it.
 if [ -z "${IN_NAMESPACES-}" ]; then
 	[ "$(id -u)" = 0 ] || skip "a new system can be made by root alone"
@@ -29,12 +32,17 @@ if [ -z "${IN_NAMESPACES-}" ]; then
 	[ $foreign = no ] || need_packages qemu-user-static arch-test gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 	unshare --mount --pid --fork true 2>/dev/null || skip "namespaces for mounts and processes are not allowed here"
 	tools/scripts/deb.sh "$architecture"
+	if command -v lintian >/dev/null; then
+		attend timeout 900 lintian --allow-root --fail-on error,warning --tag-display-limit 0 "$package" ||
+			fail "lintian finds what breaks Debian's rules"
+		echo "ok    Debian's rules, but for the exceptions in tools/packages/debian/lintian-overrides"
+	else
+		echo "skipped: Debian's rules (lintian is not installed)"
+	fi
 	IN_NAMESPACES=yes attend unshare --mount --pid --fork --kill-child --mount-proc "$0" "$architecture"
 	exit
 fi
 
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
-package=$target_root/packages/zynq-pgs_${version}_$architecture.deb
 work=$(mktemp -d)
 litter+=("$work")
 chmod 755 "$work"
@@ -53,7 +61,8 @@ start_foreign_programs() {
 	# F: the kernel keeps the file open, so that it is found in the new system.
 	printf '%s' ":$name:M::$magic:$mask:$(command -v qemu-aarch64-static):F" > $files/register ||
 		skip "the kernel takes no program for files of arm64"
-	trap "echo -1 > $files/$name || true; end_all" EXIT
+	foreign_entry=$files/$name
+	trap 'echo -1 > "$foreign_entry" || true; end_all' EXIT
 }
 [ $foreign = no ] || start_foreign_programs
 
@@ -123,7 +132,7 @@ shows "completion in bash" serve within bash -c "$complete_bash"
 if [ $foreign = no ]; then
 	# shellcheck disable=SC2016
 	shows "completion in zsh" _pgs within zsh -fc 'autoload -U compinit && compinit -u -D && echo $_comps[pgs]'
-	shows "completion in zsh, its syntax" done within zsh -fc 'zsh -n /usr/share/zsh/vendor-completions/_pgs && echo done'
+	shows "completion in zsh, its syntax" accepted within zsh -fc 'zsh -n /usr/share/zsh/vendor-completions/_pgs && echo accepted'
 	shows "completion in fish" serve within fish --no-config -c 'source /usr/share/fish/vendor_completions.d/pgs.fish; complete -C "pgs ser"'
 fi
 
@@ -162,6 +171,7 @@ if command -v systemd-analyze >/dev/null; then
 else
 	echo "skipped: systemd-analyze (not installed)"
 fi
+# shellcheck disable=SC2016 # the unit's own dollar
 command=$(sed -n 's/^ExecStart=//p' "$root/usr/lib/systemd/system/pgs-serve.service" | sed 's/ \$PGS_SERVE_OPTIONS//')
 group=$(within getent group pgs | cut -d: -f3)
 in_group() { within setpriv --reuid 65534 --regid "$group" --clear-groups "$@"; }

@@ -9,6 +9,7 @@
 # Exit code: 0 done, 1 the build failed, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+. "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
 
 command -v dpkg-deb >/dev/null || skip "needs dpkg-deb, and this is no Debian"
@@ -25,12 +26,9 @@ for tool in dtc:device-tree-compiler readelf:binutils strip:binutils python3:pyt
 	command -v "${tool%:*}" >/dev/null || need_packages "${tool#*:}"
 done
 
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
-abi=$(sed -n 's/^#define ZPGS_ABI_VERSION //p' tools/capi/include/zynq_pgs.h)
 maintainer=${DEB_MAINTAINER:-the zynq-pgs authors <packages@zynq-pgs.invalid>}
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || stat -c %Y Cargo.toml)}
 sources=tools/packages
-packages=$target_root/packages
 tree=$(mktemp -d)
 litter+=("$tree")
 chmod 755 "$tree"
@@ -44,7 +42,7 @@ build --features pgs/pages
 rm -rf "$pages"
 attend "$target_root/release/pgs" generate --out "$pages"
 
-strip=strip
+stripper="strip"
 if [ "$architecture" = "$native" ]; then
 	build
 	built=$target_root/release
@@ -55,22 +53,22 @@ elif [ "$architecture" = arm64 ]; then
 		with_shared_library build --target "$rust_target"
 	)
 	built=$target_root/aarch64-shared/$rust_target/release
-	strip=aarch64-linux-gnu-strip
+	stripper="aarch64-linux-gnu-strip"
 else
 	skip "$architecture cannot be built on $native"
 fi
 
 put() { install -D -m "$1" "$2" "$tree/$3"; }
 libraries=usr/lib/$triplet
-documents=usr/share/doc/zynq-pgs
+documents="usr/share/doc/zynq-pgs"
 
 put 755 "$built/pgs" usr/bin/pgs
 put 644 "$built/libzynq_pgs_c.so" "$libraries/libzynq_pgs_c.so.$abi"
 ln -s "libzynq_pgs_c.so.$abi" "$tree/$libraries/libzynq_pgs_c.so"
 put 644 "$built/libzynq_pgs_c.a" "$libraries/libzynq_pgs_c.a"
-$strip --strip-all --remove-section=.comment --remove-section=.note "$tree/usr/bin/pgs"
-$strip --strip-unneeded --remove-section=.comment --remove-section=.note "$tree/$libraries/libzynq_pgs_c.so.$abi"
-$strip --strip-debug --enable-deterministic-archives "$tree/$libraries/libzynq_pgs_c.a"
+$stripper --strip-all --remove-section=.comment --remove-section=.note "$tree/usr/bin/pgs"
+$stripper --strip-unneeded --remove-section=.comment --remove-section=.note "$tree/$libraries/libzynq_pgs_c.so.$abi"
+$stripper --strip-debug --enable-deterministic-archives "$tree/$libraries/libzynq_pgs_c.a"
 put 644 tools/capi/include/zynq_pgs.h usr/include/zynq_pgs.h
 mkdir -p "$tree/$libraries/pkgconfig"
 sed "s|@prefix@|/usr|; s|@version@|$version|; s|^libdir=.*|libdir=\${prefix}/lib/$triplet|" \
@@ -137,14 +135,7 @@ echo "libzynq_pgs_c $abi zynq-pgs (>= $version)" > "$tree/DEBIAN/shlibs"
 (cd "$tree" && find etc usr -type f -print0 | sort -z | xargs -0 md5sum) > "$tree/DEBIAN/md5sums"
 find "$tree" -exec touch --no-dereference --date="@$SOURCE_DATE_EPOCH" {} +
 
-package=$packages/zynq-pgs_${version}_$architecture.deb
+package=$(debian_package "$architecture")
 dpkg-deb --root-owner-group -Zxz --build "$tree" "$package" >/dev/null
 echo "$package: $(stat -c %s "$package") bytes, needs $needs"
 sha256sum "$package" | cut -d' ' -f1
-
-if command -v lintian >/dev/null; then
-	# What a package outside Debian breaks of Debian's rules is shown; an error ends the script.
-	attend lintian --allow-root --fail-on error --tag-display-limit 0 "$package" || fail "lintian finds errors"
-else
-	echo "skipped: Debian's rules (lintian is not installed)"
-fi

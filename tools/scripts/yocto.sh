@@ -9,6 +9,7 @@
 # Exit code: 0 done, 1 something is wrong with the layer, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+. "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
 
 build=no
@@ -19,15 +20,14 @@ case ${1-} in
 *) sed -n '2,/^set /s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2 ;;
 esac
 
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
-layer=$target_root/packages/meta-zynq-pgs
+layer=$packages/meta-zynq-pgs
 recipe=$layer/recipes-support/zynq-pgs
 rm -rf "$layer"
 mkdir -p "$layer/conf" "$recipe/files"
 cp tools/packages/yocto/layer.conf "$layer/conf"
 md5_of() { md5sum "$1" | cut -d' ' -f1; }
 sed "s|@md5_mit@|$(md5_of LICENSE-MIT)|; s|@md5_apache@|$(md5_of LICENSE-APACHE)|
-	s|@abi@|$(sed -n 's/^#define ZPGS_ABI_VERSION //p' tools/capi/include/zynq_pgs.h)|" \
+	s|@abi@|$abi|" \
 	tools/packages/yocto/zynq-pgs.bb > "$recipe/zynq-pgs_$version.bb"
 git ls-files -z --cached --others --exclude-standard | sort -z |
 	tar --null --files-from=- --ignore-failed-read --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 \
@@ -52,8 +52,8 @@ echo "$layer: $(crates | wc -l) crates"
 if command -v oelint-adv >/dev/null; then
 	# No address of the project exists yet, and the list has the form that BitBake's own task gives it.
 	oelint-adv --exit-zero --quiet --suppress oelint.var.mandatoryvar.HOMEPAGE --suppress oelint.vars.inconspaces \
-		"$recipe/zynq-pgs_$version.bb" 2>&1 | tee "$target_root/packages/oelint.txt"
-	! grep ':error:' "$target_root/packages/oelint.txt" || fail "oelint-adv finds errors"
+		"$recipe/zynq-pgs_$version.bb" 2>&1 | tee "$packages/oelint.txt"
+	! grep ':error:' "$packages/oelint.txt" || fail "oelint-adv finds errors"
 else
 	echo "skipped: rules of recipes (oelint-adv is not installed)"
 fi
