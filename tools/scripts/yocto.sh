@@ -2,9 +2,9 @@
 # Makes a Yocto layer with the recipe, the sources and the list of crates: target/packages/meta-zynq-pgs.
 #
 # usage: yocto.sh [--build]
-#   --build   also builds from the layer alone as the classes of the recipe do: crates by the list, without network,
-#             for aarch64
+#   --build   also builds for aarch64 from the layer alone
 #
+# Unpacks the layer's sources and crates as the fetchers do, and has cargo resolve them without network.
 # Needs no BitBake, and says nothing about what only BitBake knows.
 # Exit code: 0 done, 1 something is wrong with the layer, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
@@ -57,7 +57,6 @@ if command -v oelint-adv >/dev/null; then
 else
 	echo "skipped: rules of recipes (oelint-adv is not installed)"
 fi
-[ $build = yes ] || exit 0
 
 # As BitBake's fetcher of crates: each archive with the checksum of the list, unpacked beside a file that gives the
 # checksum to cargo.
@@ -83,11 +82,21 @@ replace-with = "bitbake"
 local-registry = "/nonexistent"
 END
 tar -xzf "$recipe/files/zynq-pgs-$version.tar.gz" -C "$work"
+manifest=$work/zynq-pgs-$version/Cargo.toml
+# unshare: without network, where this machine allows it.
+alone=()
+! unshare --net true 2>/dev/null || alone=(unshare --net)
+# In the folder of the sources: another one may have settings for cargo.
+cd "$work"
+CARGO_HOME=$work/cargo_home "${alone[@]}" cargo metadata --frozen --format-version 1 --manifest-path "$manifest" >/dev/null ||
+	fail "the list of crates is not enough"
+echo "cargo resolves the layer's crates"
+[ $build = yes ] || exit 0
+
 (
 	. tools/scripts/aarch64-env.sh
 	export CARGO_HOME=$work/cargo_home
-	# unshare: without network.
-	with_shared_library attend timeout 1800 unshare --net cargo build --frozen --target "$aarch64" --release \
-		--manifest-path "$work/zynq-pgs-$version/Cargo.toml" -p pgs -p zynq-pgs-c
+	with_shared_library attend timeout 1800 "${alone[@]}" cargo build --frozen --target "$aarch64" --release \
+		--manifest-path "$manifest" -p pgs -p zynq-pgs-c
 )
 echo "built from the layer alone, for aarch64, without network"
