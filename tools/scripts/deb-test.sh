@@ -89,19 +89,20 @@ done
 ln -s /proc/self/fd "$root/dev/fd"
 mount -t tmpfs tmpfs "$root/run"
 
-within() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 HOME=/root "$@"; }
-# What a system holds: names, kinds, rights and contents, without what dpkg logs and caches by itself.
+within() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 HOME=/tmp "$@"; }
+# Below these dpkg, ldconfig and man-db log and cache by themselves.
+own=(-path ./proc -o -path ./dev -o -path ./run -o -path ./tmp -o -path ./var/log -o -path ./var/cache)
+# The names of all other files, with dpkg's.
+names() { (cd "$root" && find . -xdev \( "${own[@]}" \) -prune -o -print) | sort; }
+# Kinds, rights, owners and contents of all other files, without dpkg's, and without the copies that groupadd makes.
 contents() {
-	local here=(. -xdev \( -path ./proc -o -path ./dev -o -path ./run -o -path ./tmp -o -path ./var/log -o
-		-path ./var/cache -o -path ./var/lib/dpkg -o -path ./etc/group- -o -path ./etc/gshadow- \) -prune -o)
+	local here=(. -xdev \( "${own[@]}" -o -path ./var/lib/dpkg -o -path ./etc/group- -o -path ./etc/gshadow- \) -prune -o)
 	(
 		cd "$root"
 		find "${here[@]}" -printf '%M %u %g %p %l\n' | sort -k 4
 		find "${here[@]}" -type f -print0 | sort -z | xargs -0 md5sum
 	)
 }
-# The names of all files, with dpkg's own.
-names() { (cd "$root" && find . -xdev \( -path ./proc -o -path ./dev -o -path ./run -o -path ./tmp \) -prune -o -print) | sort; }
 
 checked=0
 # Runs a check; its output must have a text, and nothing may come to stderr.
