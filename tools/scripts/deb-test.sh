@@ -139,14 +139,14 @@ for verb in $verbs; do shows "man pgs-$verb" "EXAMPLES" page "pgs-$verb"; done
 # shellcheck disable=SC2016 # for the shell within
 complete_bash='. /usr/share/bash-completion/bash_completion
 _completion_loader pgs || [ $? = 124 ]
-COMP_WORDS=(pgs ser) COMP_CWORD=1
-$(complete -p pgs | sed "s/.*-F \([^ ]*\).*/\1/") pgs ser pgs && echo "${COMPREPLY[*]}"'
+COMP_WORDS=(pgs serv) COMP_CWORD=1
+$(complete -p pgs | sed "s/.*-F \([^ ]*\).*/\1/") pgs serv pgs && echo "${COMPREPLY[*]}"'
 shows "completion in bash" serve within bash -c "$complete_bash"
 if [ $foreign = no ]; then
 	# shellcheck disable=SC2016
 	shows "completion in zsh" _pgs within zsh -fc 'autoload -U compinit && compinit -u -D && echo $_comps[pgs]'
 	shows "completion in zsh, its syntax" accepted within zsh -fc 'zsh -n /usr/share/zsh/vendor-completions/_pgs && echo accepted'
-	shows "completion in fish" serve within fish --no-config -c 'source /usr/share/fish/vendor_completions.d/pgs.fish; complete -C "pgs ser"'
+	shows "completion in fish" serve within fish --no-config -c 'source /usr/share/fish/vendor_completions.d/pgs.fish; complete -C "pgs serv"'
 fi
 
 # The directories of the system are left out as the compiler's own.
