@@ -17,6 +17,7 @@ use crate::external::ExternalAccelerator;
 use crate::fault::FaultPlan;
 use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
+use crate::recording::Recording;
 use crate::shortcut;
 use crate::violation::{RegisterAccess, Violation};
 use pgs_interface::record::Beat;
@@ -151,6 +152,17 @@ impl EmulatedBoard {
     #[must_use]
     pub fn faults(&self) -> u64 {
         with_board(&self.0, |board| board.faults())
+    }
+
+    /// Records the course of the board's time from now on.
+    pub fn record(&self) {
+        with_board(&self.0, Board::start_recording);
+    }
+
+    /// Ends the recording under way; none if there is none.
+    #[must_use]
+    pub fn take_recording(&self) -> Option<Recording> {
+        with_board(&self.0, Board::take_recording)
     }
 
     /// The packets that have ended since the last step began, in the order of their ends.

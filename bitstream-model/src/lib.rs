@@ -13,6 +13,7 @@ pub mod external;
 mod fault;
 mod handle;
 mod memory;
+pub mod recording;
 #[cfg(unix)]
 pub mod remote;
 mod shortcut;

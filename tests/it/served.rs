@@ -50,6 +50,7 @@ impl Served {
         let socket = folder.path().join("board");
         let memory = memory(&socket).expect("memory");
         let mut server = Server::bind(config, memory, &socket, accelerator).expect("served");
+        server.set_driver_limit(DRIVER_LIMIT);
         let (board, stopper) = (server.board().clone(), server.stopper());
         let (sender, visits) = channel();
         let thread = std::thread::spawn(move || {
@@ -605,6 +606,9 @@ fn a_memory_that_was_changed_since_its_board_was_served_is_refused() {
     );
 }
 
+/// The server's time limit of a driver.
+const DRIVER_LIMIT: Duration = Duration::from_secs(1);
+
 /// Time in which a driver or a board must notice a failure of the other side.
 const NOTICE_LIMIT: Duration = Duration::from_secs(9);
 
@@ -623,9 +627,9 @@ fn connections_that_say_nothing_do_not_hold_the_board() {
         stream.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
         assert_eq!(stream.read(&mut [0]).expect("hung up in time"), 0);
         let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
-        assert_eq!(error.to_string(), "it sent no request within 5s");
+        assert_eq!(error.to_string(), "it sent no request within 1s");
     }
-    assert!(started.elapsed() >= Duration::from_secs(4), "they had their time");
+    assert!(started.elapsed() >= DRIVER_LIMIT / 2, "they had their time");
     steps(&mut served.open(), 5);
 }
 
@@ -646,7 +650,7 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
     mute.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(mute.read(&mut [0]).expect("hung up in time"), 0);
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
-    assert_eq!(error.to_string(), "it asked for no memory within 5s");
+    assert_eq!(error.to_string(), "it asked for no memory within 1s");
     steps(&mut served.open(), 5);
     assert!(matches!(served.visit().ended, Ended::Left));
 
@@ -660,7 +664,7 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
     half.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(half.read(&mut [0]).expect("hung up in time"), 0);
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
-    assert_eq!(error.to_string(), "it sent half a request and no more within 5s");
+    assert_eq!(error.to_string(), "it sent half a request and no more within 1s");
 
     let mut unread = raw(&served);
     unread.set_write_timeout(Some(2 * NOTICE_LIMIT)).expect("set");
@@ -668,7 +672,7 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
     unread.write_all(&hello).expect("sent");
     while unread.write_all(&many).is_ok() {}
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
-    assert_eq!(error.to_string(), "it read no answer within 5s");
+    assert_eq!(error.to_string(), "it read no answer within 1s");
     steps(&mut served.open(), 5);
 }
 
@@ -678,7 +682,7 @@ fn a_driver_that_is_idle_keeps_the_board_and_others_are_told_at_once() {
     let mut idle = served.open();
     let (first, _) = steps(&mut idle, 5);
     // Longer than the limit for others; other drivers come meanwhile.
-    let until = Instant::now() + Duration::from_secs(6);
+    let until = Instant::now() + DRIVER_LIMIT + DRIVER_LIMIT / 5;
     let hello = Request::Hello { version: VERSION }.encode();
     let other = Request::Hello { version: VERSION + 1 }.encode();
     let silent = raw(&served);

@@ -50,6 +50,13 @@ fi
 work=$DEB_TEST_WORK
 root=$work/root
 
+# Leaves the exit code as it is.
+end_foreign_programs() {
+	local code=$?
+	echo -1 > "$foreign_entry" || true
+	return $code
+}
+
 # Has the kernel start programs of arm64 by QEMU, unless it already does.
 start_foreign_programs() {
 	local files=/proc/sys/fs/binfmt_misc name=zynq-pgs-deb-test magic mask entry
@@ -64,7 +71,7 @@ start_foreign_programs() {
 	printf '%s' ":$name:M::$magic:$mask:$(command -v qemu-aarch64-static):F" > $files/register ||
 		skip "the kernel takes no program for files of arm64"
 	foreign_entry=$files/$name
-	trap 'echo -1 > "$foreign_entry" || true; end_all' EXIT
+	trap 'end_foreign_programs || end_all; end_all' EXIT
 }
 [ $foreign = no ] || start_foreign_programs
 
@@ -90,13 +97,14 @@ ln -s /proc/self/fd "$root/dev/fd"
 mount -t tmpfs tmpfs "$root/run"
 
 within() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 HOME=/tmp "$@"; }
-# Below these dpkg, ldconfig and man-db log and cache by themselves.
-own=(-path ./proc -o -path ./dev -o -path ./run -o -path ./tmp -o -path ./var/log -o -path ./var/cache)
+# Here dpkg, ldconfig and man-db log and cache by themselves, and groupadd keeps the last state of its files.
+own=(-path ./proc -o -path ./dev -o -path ./run -o -path ./tmp -o -path ./var/log -o -path ./var/cache
+	-o -path ./etc/group- -o -path ./etc/gshadow-)
 # The names of all other files, with dpkg's.
 names() { (cd "$root" && find . -xdev \( "${own[@]}" \) -prune -o -print) | sort; }
-# Kinds, rights, owners and contents of all other files, without dpkg's, and without the copies that groupadd makes.
+# Kinds, rights, owners and contents of all other files, without dpkg's.
 contents() {
-	local here=(. -xdev \( "${own[@]}" -o -path ./var/lib/dpkg -o -path ./etc/group- -o -path ./etc/gshadow- \) -prune -o)
+	local here=(. -xdev \( "${own[@]}" -o -path ./var/lib/dpkg \) -prune -o)
 	(
 		cd "$root"
 		find "${here[@]}" -printf '%M %u %g %p %l\n' | sort -k 4

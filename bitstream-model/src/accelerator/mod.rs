@@ -33,6 +33,7 @@ use crate::config::BoardConfig;
 use crate::config::quirks::Resettable;
 use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed, end_of_reset};
 use crate::memory::Memory;
+use crate::recording::{Stage, StageCounts, StageLog, StageSpan};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 use pgs_interface::control::{
@@ -109,6 +110,8 @@ pub(crate) struct Accelerator {
     /// The collisions of the issue under way in a warm pass; kept for its memory.
     warm_issue: Vec<Collision>,
     window: Option<Box<window::Windowed>>,
+    /// The stages of the step, while the board is recorded.
+    stages: Option<Box<StageLog>>,
 }
 
 impl Accelerator {
@@ -139,6 +142,7 @@ impl Accelerator {
             impulses: Vec::new(),
             warm_issue: Vec::new(),
             window: None,
+            stages: None,
         }
     }
 
@@ -187,6 +191,7 @@ impl Accelerator {
                 self.start_due = false;
                 self.debt = 0;
                 self.hung = false;
+                self.note_stage();
                 Some(false)
             }
         }
@@ -212,6 +217,47 @@ impl Accelerator {
     /// Whether a step is under way.
     pub(crate) fn running(&self) -> bool {
         self.reset_until.is_none() && self.busy()
+    }
+
+    /// Notes the stages from now on.
+    pub(crate) fn watch_stages(&mut self) {
+        self.stages = Some(Box::default());
+    }
+
+    /// A step begins at a clock of the board.
+    pub(crate) fn step_begins_at(&mut self, now: u64) {
+        if let Some(stages) = &mut self.stages {
+            stages.begin_step(now);
+        }
+    }
+
+    /// The board's clock at which the accelerator has sent last, if it is watched.
+    pub(crate) fn sent_at(&self) -> Option<u64> {
+        self.stages.as_ref().map(|stages| stages.sent_at())
+    }
+
+    /// The stages that have ended since they are watched, and watches no more.
+    pub(crate) fn take_stages(&mut self) -> Vec<StageSpan> {
+        self.stages.take().map_or_else(Vec::new, |stages| stages.finish())
+    }
+
+    fn note_stage(&mut self) {
+        let Some(stages) = &mut self.stages else { return };
+        let contact = self.arguments.contact_passes();
+        let stage = match self.phase {
+            Phase::Idle | Phase::Failed => None,
+            Phase::Ending => return,
+            Phase::Load(_) => Some(Stage::Load),
+            Phase::Pass { number, .. } => Some(match number.checked_sub(contact) {
+                None => Stage::Contact(number + 1),
+                Some(number) => Stage::Friction(number + 1),
+            }),
+            Phase::Integrate { .. } => Some(Stage::Integrate),
+            Phase::SendVelocities(_) => Some(Stage::SendVelocities),
+            Phase::Window => Some(Stage::Window),
+        };
+        let Counters { stalls, waits, hazards, .. } = self.counters;
+        stages.note(stage, self.clock, StageCounts { stalls, waits, hazards });
     }
 
     /// Whether a step begins with the next run.
@@ -267,6 +313,7 @@ impl Accelerator {
             if self.debt > 0 {
                 break;
             }
+            self.note_stage();
             // After it hangs no other fault can happen.
             if !self.hung && !faults.none() {
                 ran.progressed |= self.apply_due_fault(faults, inputs, deferral.as_deref_mut());

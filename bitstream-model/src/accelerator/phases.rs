@@ -91,6 +91,9 @@ impl Accelerator {
 
     pub(crate) fn sent(&mut self, sum: u32) {
         self.counters.sum_sent = self.counters.sum_sent.wrapping_add(sum);
+        if let Some(stages) = &mut self.stages {
+            stages.sends(self.clock);
+        }
     }
 
     /// Loads the velocities that have arrived, a beat a cycle from each stream of 128 bits.

@@ -17,6 +17,7 @@ use crate::config::quirks::Resettable;
 use crate::config::{BoardConfig, Delays, cycles_of};
 use crate::fault::{FaultKind, Faults, Place, StepPhase, end_of_reset};
 use crate::memory::Memory;
+use crate::recording::Recorder;
 use crate::stream::Stream;
 use crate::violation::Log;
 use pgs_interface::axi_dma::{DMACR, Direction, S2MM_OFFSET, dmacr};
@@ -78,6 +79,8 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) faults: &'a mut Faults,
     /// Whether the receiver takes beats by reference: they stay in their buffer.
     pub(crate) by_reference: bool,
+    /// Takes notes, if the board is to be recorded.
+    pub(crate) recorder: Option<&'a mut Recorder>,
 }
 
 /// One AXI DMA.
@@ -231,8 +234,15 @@ impl Core {
         let channel = self.channel(direction);
         if channel.cannot_move(stream) {
             channel.time = channel.time.max(start);
+            if let Some(recorder) = &mut with.recorder {
+                channel.note_rest(&build, stream, recorder);
+            }
             return (0, false);
         }
-        channel.run(&build, start, end, limit, stream, with)
+        let outcome = channel.run(&build, start, end, limit, stream, with);
+        if let Some(recorder) = &mut with.recorder {
+            channel.note_rest(&build, stream, recorder);
+        }
+        outcome
     }
 }

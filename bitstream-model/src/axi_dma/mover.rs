@@ -10,6 +10,7 @@ use super::{Build, PacketCount, Surroundings};
 use crate::cast::register;
 use crate::fault::FaultKind;
 use crate::memory::Denied;
+use crate::recording::Recorder;
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
 use pgs_interface::axi_dma::Direction;
@@ -143,6 +144,22 @@ impl Channel {
         (moved, changed || moved > 0)
     }
 
+    /// Notes that no beat moves from the channel's clock on, and which side of the stream waits.
+    pub(super) fn note_rest(&self, build: &Build, stream: &Stream, recorder: &mut Recorder) {
+        let has_part = match self.work {
+            Work::None | Work::Fetch { .. } => false,
+            Work::Descriptor(bd) => bd.moved < bd.length,
+            Work::Direct { moved } => moved < self.length,
+        };
+        let (beats, room) = (stream.len() > 0, stream.space() > 0);
+        // Where both could, the memory holds the channel up.
+        let sides = match self.direction {
+            Direction::Mm2s => [has_part && !room, room],
+            Direction::S2mm => [beats, has_part && !beats],
+        };
+        recorder.rests((build.core, self.direction), self.time, sides);
+    }
+
     /// S2MM in scatter-gather mode: the chain has ended in the middle of a packet and more comes.
     fn overrun(&self, stream: &Stream) -> bool {
         // A channel that has failed already is on its way to Halted.
@@ -200,9 +217,11 @@ impl Channel {
                 return Transferred::Stopped;
             }
         };
+        let ends = self.direction == Direction::S2mm && stream.next_last() == Some(n - 1);
         let Some(mut ended) = self.transfer(build, n, mask, part, stream, with) else {
             return Transferred::Stopped;
         };
+        let begin = self.time;
         let clocks = (n as u64) << self.beat_shift(build);
         self.time += clocks + n as u64 * u64::from(self.faulty.slow);
         self.beats += n as u64;
@@ -217,6 +236,11 @@ impl Channel {
                     ended = true;
                 }
             }
+        }
+        if let Some(recorder) = &mut with.recorder {
+            let last = ends || self.direction == Direction::Mm2s && stream.ends_with_last();
+            let beats = (n as u64, 1 << self.beat_shift(build));
+            recorder.moves((build.core, self.direction), begin, beats, last);
         }
         Transferred::Beats { n, ended }
     }
@@ -392,6 +416,9 @@ impl Channel {
             let kind = ViolationKind::Misaligned { core, direction, address: buffer, length };
             with.log.violation(kind);
         }
+        if let Some(recorder) = &mut with.recorder {
+            recorder.descriptor_begins((core, direction), self.time, address);
+        }
         let next = join(NXTDESC, NXTDESC_MSB);
         self.work = Work::Descriptor(Descriptor {
             address,
@@ -454,6 +481,9 @@ impl Channel {
             return;
         }
         self.check_rest(build, &bd, with);
+        if let Some(recorder) = &mut with.recorder {
+            recorder.descriptor_ends((build.core, self.direction), self.time, bd.moved);
+        }
         with.moved.descriptors += 1;
         self.descriptors += 1;
         if ended {
@@ -493,6 +523,9 @@ impl Channel {
         let (beats, descriptors) = (self.beats, self.descriptors);
         let phase = with.faults.phase(core, direction);
         with.moved.packets.push(PacketCount { core, direction, phase, beats, descriptors });
+        if let Some(recorder) = &mut with.recorder {
+            recorder.packet_ends((core, direction), self.time, phase, (beats, descriptors));
+        }
         with.faults.packet_ends(core, direction);
         (self.beats, self.descriptors) = (0, 0);
         self.faulty.slow = 0;

@@ -19,6 +19,7 @@ use crate::config::quirks::InterruptWiring;
 use crate::external::{ExternalAccelerator, ExternalError, Installed};
 use crate::fault::{Fault, FaultKind, Faults};
 use crate::memory::{Memory, MemoryError};
+use crate::recording::{Recorder, Recording};
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 use pgs_interface::axi_dma::Direction;
@@ -75,6 +76,7 @@ pub(crate) struct Board {
     turn: Turn,
     /// `None`: the board moves and computes everything slice by slice.
     short_cut: Option<Box<dyn ShortCut>>,
+    recorder: Option<Box<Recorder>>,
 }
 
 impl Board {
@@ -111,6 +113,7 @@ impl Board {
             arbiter: Arbiter::new(&config, cores),
             turn: Turn::default(),
             short_cut,
+            recorder: None,
         }
     }
 
@@ -147,6 +150,21 @@ impl Board {
     /// The packets that ended since the last step began.
     pub(crate) fn packets(&self) -> &[PacketCount] {
         &self.moved.packets
+    }
+
+    /// Records from now on.
+    pub(crate) fn start_recording(&mut self) {
+        let clock = (self.config.profile.clock_khz, self.access_cycles());
+        let level = self.interrupt.level();
+        let recorder = Recorder::new(self.now, clock, self.cores.len(), level);
+        self.recorder = Some(Box::new(recorder));
+        self.accelerator.model.watch_stages();
+    }
+
+    /// Ends the recording.
+    pub(crate) fn take_recording(&mut self) -> Option<Recording> {
+        let recorder = self.recorder.take()?;
+        Some(recorder.finish(self.now, self.accelerator.model.take_stages()))
     }
 
     /// Applies the due faults of the board as a whole; with `access`, also the faults of a register
@@ -186,7 +204,11 @@ impl Board {
     }
 
     fn record(&mut self, address: u64, write: bool, value: u32) {
-        self.log.access(RegisterAccess { cycle: self.now, address, write, value });
+        let access = RegisterAccess { cycle: self.now, address, write, value };
+        self.log.access(access);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.access(access);
+        }
     }
 
     pub(crate) fn read32(&mut self, address: u64) -> u32 {
@@ -242,7 +264,13 @@ impl Board {
             Target::Unaligned => Err(ViolationKind::UnalignedRegister { address }),
         };
         match done {
-            Ok(doorbell) => self.counts.doorbells += u64::from(doorbell),
+            Ok(true) => {
+                self.counts.doorbells += 1;
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.doorbell(self.now);
+                }
+            }
+            Ok(false) => {}
             Err(kind) => self.log.violation(kind),
         }
         self.update_interrupt();
@@ -267,6 +295,9 @@ impl Board {
             }
         }
         self.interrupt.set(level, self.now);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.interrupt(self.now, self.interrupt.level());
+        }
     }
 
     /// Lets time pass until `until`; with `watch`, only until an interrupt is pending.
@@ -283,11 +314,17 @@ impl Board {
             let limit = event - self.now;
             if self.accelerator.starts() {
                 self.moved.packets.clear();
+                self.accelerator.model.step_begins_at(self.now);
             }
             let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
             let deferral = self.short_cut.as_mut().map(|short_cut| short_cut.defer());
             let (faults, memory) = (&mut self.faults, &self.memory);
             let ran = self.accelerator.run(limit, inputs, outputs, faults, memory, deferral);
+            if let (Some(recorder), Some(sent)) =
+                (&mut self.recorder, self.accelerator.model.sent_at())
+            {
+                recorder.sent_at(sent);
+            }
             let waits = ran.cycles == 0;
             let mut slice = if waits { limit.min(STARVED_CYCLES) } else { ran.cycles };
             if waits && ran.progressed {
@@ -300,6 +337,9 @@ impl Board {
             }
             if waits && slice > 0 && self.accelerator.running() {
                 self.accelerator.starve(slice);
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.waits(self.now, slice);
+                }
             }
             self.now += slice;
             self.apply_due_faults(false);
@@ -313,7 +353,9 @@ impl Board {
     /// records flow.
     fn fast_forward(&mut self, until: u64) {
         let Some(short_cut) = &mut self.short_cut else { return };
-        let undisturbed = self.faults.none()
+        // A recording has the clock of every beat.
+        let undisturbed = self.recorder.is_none()
+            && self.faults.none()
             && self.config.quirks.unconnected.is_none()
             && self.inputs.iter().chain(&self.outputs).all(|stream| !stream.marked())
             && self.interrupt.next_event().is_none()
@@ -410,6 +452,7 @@ impl Board {
             moved: &mut self.moved,
             faults: &mut self.faults,
             by_reference: self.short_cut.as_mut().is_some_and(|of| of.defer().takes_collisions()),
+            recorder: self.recorder.as_deref_mut(),
         };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)
     }

@@ -7,6 +7,7 @@
 
 mod blocks;
 mod cycles;
+mod host;
 mod ports;
 mod resources;
 mod schedule;
@@ -18,6 +19,7 @@ mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
 pub use cycles::{StepCycles, StepShape};
+pub use host::{A53_COPIES, a53_copy_seconds};
 pub use ports::{LoadPorts, OnChipArray, PORTS, PortAccount, PortUse};
 pub use resources::{ArrayUse, MemoryUse};
 pub use schedule::{Access, AccessKind, Schedule, Slot};

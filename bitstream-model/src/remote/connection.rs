@@ -11,9 +11,6 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use pgs_interface::message::{ANSWER_BYTES, REQUEST_BYTES};
 
-/// Time limit for the rest of a request that has begun, and for the driver to read an answer.
-pub(super) const TRANSFER_LIMIT: Duration = Duration::from_secs(5);
-
 /// A connection, and the bytes of its next request that have arrived.
 #[derive(Debug)]
 pub(super) struct Connection {
@@ -22,6 +19,7 @@ pub(super) struct Connection {
     filled: usize,
     /// The time at which the request that has begun must be whole.
     due: Option<Instant>,
+    limit: Duration,
 }
 
 /// Whether the other side is still there.
@@ -32,9 +30,16 @@ pub(super) enum Presence {
 }
 
 impl Connection {
-    pub(super) fn new(stream: UnixStream) -> io::Result<Self> {
+    /// `limit` bounds the wait for the rest of a request that has begun, and for the driver to read
+    /// an answer.
+    pub(super) fn new(stream: UnixStream, limit: Duration) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
-        Ok(Self { stream, request: [0; REQUEST_BYTES], filled: 0, due: None })
+        Ok(Self { stream, request: [0; REQUEST_BYTES], filled: 0, due: None, limit })
+    }
+
+    /// The time limit of a driver.
+    pub(super) fn limit(&self) -> Duration {
+        self.limit
     }
 
     /// Another handle of its stream.
@@ -70,7 +75,7 @@ impl Connection {
             Ok(0) => Ok(Presence::Gone),
             Ok(read) => {
                 self.filled += read;
-                self.due = self.due.or_else(|| Instant::now().checked_add(TRANSFER_LIMIT));
+                self.due = self.due.or_else(|| Instant::now().checked_add(self.limit));
                 Ok(Presence::There)
             }
             Err(error)
@@ -84,7 +89,7 @@ impl Connection {
 
     /// Sends an answer.
     pub(super) fn send(&mut self, answer: &[u8; ANSWER_BYTES]) -> io::Result<()> {
-        let until = Instant::now() + TRANSFER_LIMIT;
+        let until = Instant::now() + self.limit;
         let mut rest = answer.as_slice();
         while !rest.is_empty() {
             match self.stream.write(rest) {
@@ -93,7 +98,7 @@ impl Connection {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     if Instant::now() >= until {
-                        return Err(late("read no answer", TRANSFER_LIMIT));
+                        return Err(late("read no answer", self.limit));
                     }
                     let mut end = [PollFd::new(self.stream.as_fd(), PollFlags::POLLOUT)];
                     wait(&mut end, Some(until))?;

@@ -13,8 +13,9 @@ use super::connection::{Connection, Presence, late, wait};
 use super::visit::Ended;
 use pgs_interface::message::{Answer, Request, Status, VERSION};
 
-/// Time limit for a connection to send its first request.
-pub(super) const FIRST_LIMIT: Duration = Duration::from_secs(5);
+/// Time limit of a driver for its first request and its next, for the rest of a request that has
+/// begun, and to read an answer.
+pub(super) const DRIVER_LIMIT: Duration = Duration::from_secs(5);
 /// Most pending connections; the next one replaces the oldest.
 const PENDING_MAX: usize = 32;
 /// Pause of accepting after the system had no resources for a connection.
@@ -27,6 +28,7 @@ pub(super) struct PendingConnections {
     accepting: Accepting,
     /// The oldest first.
     pending: Vec<Pending>,
+    limit: Duration,
 }
 
 /// Whether the socket accepts connections.
@@ -58,7 +60,12 @@ impl PendingConnections {
     /// Takes over a listener.
     pub(super) fn new(listener: UnixListener) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
-        Ok(Self { listener, accepting: Accepting::Yes, pending: Vec::new() })
+        Ok(Self { listener, accepting: Accepting::Yes, pending: Vec::new(), limit: DRIVER_LIMIT })
+    }
+
+    /// Sets the time limit of the drivers that connect from now on.
+    pub(super) fn set_limit(&mut self, limit: Duration) {
+        self.limit = limit;
     }
 
     /// Removes the oldest connection that has sent a request or has ended.
@@ -116,7 +123,8 @@ impl PendingConnections {
                 };
             }
             if entry.ended.is_none() && !entry.connection.is_whole() && entry.due <= now {
-                entry.ended = Some(Ended::Broken(late("sent no request", FIRST_LIMIT)));
+                entry.ended =
+                    Some(Ended::Broken(late("sent no request", entry.connection.limit())));
             }
         }
         if ready.accepting {
@@ -154,14 +162,16 @@ impl PendingConnections {
 
     /// Accepts the next connection.
     fn accept(&mut self, now: Instant) {
-        let accepted = self.listener.accept().and_then(|(stream, _)| Connection::new(stream));
+        let limit = self.limit;
+        let accepted =
+            self.listener.accept().and_then(|(stream, _)| Connection::new(stream, limit));
         match accepted {
             Ok(connection) => {
                 if self.pending.len() == PENDING_MAX {
                     log::warn!("{PENDING_MAX} connections sent no request: dropping the oldest");
                     self.pending.remove(0);
                 }
-                self.pending.push(Pending { connection, due: now + FIRST_LIMIT, ended: None });
+                self.pending.push(Pending { connection, due: now + limit, ended: None });
             }
             Err(error) => match error.kind() {
                 // Not an error: with the last two, the connection is gone already.

@@ -162,6 +162,13 @@ impl Server {
         &self.board
     }
 
+    /// Sets how long the server waits for a driver that owes it a request or does not read an
+    /// answer, 5 s by default. It holds for drivers that connect from now on; a driver that has the
+    /// memory may pause between two requests as long as it likes.
+    pub fn set_driver_limit(&mut self, limit: Duration) {
+        self.pending.set_limit(limit);
+    }
+
     /// A handle that stops the server.
     #[must_use]
     pub fn stopper(&self) -> Stopper {

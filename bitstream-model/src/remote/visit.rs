@@ -3,8 +3,8 @@
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-use super::connection::{Connection, Presence, TRANSFER_LIMIT, late};
-use super::pending::{FIRST_LIMIT, PendingConnections};
+use super::connection::{Connection, Presence, late};
+use super::pending::PendingConnections;
 use crate::handle::{CpuPort, EmulatedBoard};
 use pgs_interface::message::{Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
 
@@ -102,7 +102,8 @@ impl<'a> Session<'a> {
     /// The next request; `None` if the driver is gone.
     fn next_request(&mut self) -> io::Result<Option<[u8; REQUEST_BYTES]>> {
         // A driver that has the memory may take any time between two requests, but not inside one.
-        let first = (!self.has_memory).then(|| Instant::now() + FIRST_LIMIT);
+        let limit = self.connection.limit();
+        let first = (!self.has_memory).then(|| Instant::now() + limit);
         loop {
             if let Some(request) = self.connection.take_request() {
                 return Ok(Some(request));
@@ -110,8 +111,8 @@ impl<'a> Session<'a> {
             let until = self.connection.due().into_iter().chain(first).min();
             if until.is_some_and(|until| until <= Instant::now()) {
                 return Err(match self.connection.due() {
-                    Some(_) => late("sent half a request and no more", TRANSFER_LIMIT),
-                    None => late("asked for no memory", FIRST_LIMIT),
+                    Some(_) => late("sent half a request and no more", limit),
+                    None => late("asked for no memory", limit),
                 });
             }
             if self.check_presence(until)? == Presence::Gone {

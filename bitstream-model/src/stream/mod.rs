@@ -155,6 +155,11 @@ impl Stream {
         self.lasts.push_back(self.put - 1);
     }
 
+    /// Whether the newest beat carries TLAST.
+    pub(crate) fn ends_with_last(&self) -> bool {
+        self.lasts.back().is_some_and(|number| number + 1 == self.put)
+    }
+
     /// Marks the newest beat as having invalid bytes.
     pub(crate) fn mark_partial(&mut self) {
         self.partials.push_back(self.put - 1);

@@ -13,6 +13,7 @@ mod formats;
 mod profiles;
 mod properties;
 mod quirks;
+mod recording;
 mod registers;
 mod scatter_gather;
 mod shortcuts;

@@ -14,7 +14,6 @@
 
 pub mod options;
 pub mod step;
-pub mod yardstick;
 
 use std::error::Error;
 use std::ffi::OsString;

@@ -19,6 +19,9 @@ Examples:
   pgs formats --input vectors/full_step186
   pgs model --collisions 127000 --bodies 38880
   pgs order --input vectors/full_step186
+  pgs report --out report              the thesis' tables and figures again
+  pgs study determinism --input vectors/full_step186
+  pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs check                            test the board; with --board emulated the emulated one
@@ -101,7 +104,7 @@ fn reads(verb: &Verb) -> Reads {
             Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
                 true
             }
-            Verb::Compare(_) => true,
+            Verb::Compare(_) | Verb::Study(_) => true,
             // The step of a folder is measured without taking it.
             Verb::Formats(args) => args.takes_steps(),
             _ => false,

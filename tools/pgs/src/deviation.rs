@@ -6,8 +6,9 @@
 //! | share within 1 % | all components | is within if the new one is 0 too |
 //! | absolute difference, \|new - original\| | all components | counts like any other |
 
+use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use zynq_pgs::Body;
+use zynq_pgs::{Body, Shape};
 
 /// Relative deviation up to which two numbers count as the same.
 const ONE_PERCENT: f64 = 0.01;
@@ -95,23 +96,28 @@ impl Deviation {
     }
 }
 
+impl Serialize for Deviation {
+    /// As [`to_json`](Self::to_json).
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_json().serialize(serializer)
+    }
+}
+
 /// The deviations between two states of the same bodies, for moving bodies only.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(crate) struct StateDeviation {
     pub(crate) position: Deviation,
+    #[serde(rename = "linear_velocity")]
     pub(crate) linear: Deviation,
+    #[serde(rename = "angular_velocity")]
     pub(crate) angular: Deviation,
 }
 
 impl StateDeviation {
     /// Compares `new` with `original`; `moving` marks the moving bodies.
     pub(crate) fn of(original: &[Body], new: &[Body], moving: &[bool]) -> Self {
-        let of = |field: fn(&Body) -> [f32; 3]| {
-            Deviation::of(
-                pairs(original, new, moving)
-                    .flat_map(|(original, new)| field(original).into_iter().zip(field(new))),
-            )
-        };
+        let of =
+            |field: fn(&Body) -> [f32; 3]| Deviation::of(components(original, new, moving, field));
         Self {
             position: of(|body| body.pose.position),
             linear: of(|body| body.velocity.linear),
@@ -136,6 +142,26 @@ pub(crate) fn unmoved_share(
         }
     }
     mean(unmoved as f64, components)
+}
+
+/// Whether each body can move.
+pub(crate) fn moving(bodies: &[Body], shapes: &[Shape]) -> Vec<bool> {
+    let moves = |body: &Body| {
+        let shape = usize::try_from(body.shape).ok().and_then(|index| shapes.get(index));
+        shape.is_some_and(|shape| shape.inverse_mass != 0.0)
+    };
+    bodies.iter().map(moves).collect()
+}
+
+/// The pairs (original, new) of the moving bodies' components.
+pub(crate) fn components<'a>(
+    original: &'a [Body],
+    new: &'a [Body],
+    moving: &'a [bool],
+    field: fn(&Body) -> [f32; 3],
+) -> impl Iterator<Item = (f32, f32)> + 'a {
+    pairs(original, new, moving)
+        .flat_map(move |(original, new)| field(original).into_iter().zip(field(new)))
 }
 
 fn pairs<'a>(

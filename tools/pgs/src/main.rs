@@ -16,6 +16,7 @@ mod difference;
 mod environment;
 mod failure;
 mod footprint;
+mod histogram;
 mod interrupt;
 mod loading;
 mod narrow;
@@ -24,7 +25,10 @@ mod options;
 mod output;
 #[cfg(feature = "pages")]
 mod pages;
+mod permutation;
+mod power;
 mod step_input;
+mod traced;
 mod verbs;
 
 use std::io::{self, Write};

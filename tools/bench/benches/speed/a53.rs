@@ -8,6 +8,7 @@ use std::time::Duration;
 use bench::milliseconds;
 use bench::step::Emulated;
 use bitstream_model::BoardConfig;
+use bitstream_model::estimate::A53_COPIES;
 use bitstream_model::interface::profile::FLOAT;
 use serde_json::{Value, json};
 
@@ -18,9 +19,6 @@ use crate::{Options, Outcome};
 const CLOCK: f64 = 1.2e9;
 /// Instructions per clock: the core is in-order and issues at most two.
 const PER_CLOCK: [f64; 2] = [1.0, 2.0];
-/// Bandwidth in bytes per second of a memcpy of 8 MB on A53 cores of another chip, by the number of
-/// cores (TI SPRADG0A, AM62P, `bw_mem 8M bcopy`).
-const COPIED: [(u32, f64); 3] = [(1, 1956.71e6), (2, 3122.66e6), (4, 3605.80e6)];
 
 fn seconds(time: f64) -> Duration {
     Duration::from_secs_f64(time)
@@ -43,7 +41,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     let results = bytes(words.result, report.bodies);
     let device = report.modelled_time();
     let computing = PER_CLOCK.map(|rate| seconds(each * entries as f64 / (CLOCK * rate)));
-    let rows: Vec<(u32, Duration, Duration)> = COPIED
+    let rows: Vec<(u32, Duration, Duration)> = A53_COPIES
         .iter()
         .map(|(cores, rate)| {
             (*cores, seconds((collisions + bodies) / rate), seconds(results / rate))

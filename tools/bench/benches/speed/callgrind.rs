@@ -6,11 +6,11 @@ use std::hint::black_box;
 use std::process::Command;
 
 use bench::step::{Emulated, Step};
-use bench::yardstick::Yardstick;
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::ValueEnum;
 use serde_json::{Value, json};
+use yardstick::Yardstick;
 use zynq_pgs::StepParameters;
 use zynq_pgs::bench::CollisionPacker;
 
@@ -18,12 +18,12 @@ use crate::{Options, Outcome};
 
 /// The counted functions, and the passes that they solve.
 const COUNTED: [(&str, Passes); 4] = [
-    ("bench::yardstick::Yardstick::solve", |parameters| {
+    ("yardstick::Yardstick::solve", |parameters| {
         parameters.contact_iterations + parameters.friction_iterations
     }),
-    ("bench::yardstick::Yardstick::make_rows", |_| 1),
-    ("bench::yardstick::passes::contact", |parameters| parameters.contact_iterations),
-    ("bench::yardstick::passes::friction", |parameters| parameters.friction_iterations),
+    ("yardstick::Yardstick::make_rows", |_| 1),
+    ("yardstick::passes::contact", |parameters| parameters.contact_iterations),
+    ("yardstick::passes::friction", |parameters| parameters.friction_iterations),
 ];
 
 /// Selects a number of passes from a step's parameters.

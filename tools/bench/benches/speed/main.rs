@@ -8,7 +8,7 @@
 //!
 //! The measured step is of the thesis' cubes, standing on the ground and stepped on the emulated
 //! board, or is in a folder of arrays (`--input`). The board takes it in the order without hazards,
-//! and so does the yardstick: a sequential scalar solver, see `bench::yardstick`. Both must give
+//! and so does the yardstick: a sequential scalar solver, see `tools/yardstick`. Both must give
 //! the same bits, or the benchmark prints no figures.
 
 #![forbid(unsafe_code)]

@@ -4,11 +4,11 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use bench::step::{Emulated, Step, Taken};
-use bench::yardstick::{Record, Stages, Yardstick};
 use bench::{median, milliseconds, ratio};
 use bitstream_model::BoardConfig;
 use serde_json::{Value, json};
 use step_folder::digest;
+use yardstick::{Record, Stages, Yardstick};
 
 use crate::{Options, Outcome};
 

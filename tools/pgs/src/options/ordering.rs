@@ -1,22 +1,37 @@
 //! The order of a step's collisions, on the command line and in the texts of `pgs compare`.
 
-use clap::{Args, ValueEnum};
+use std::ffi::OsStr;
+
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, Args, Command, ValueEnum};
 use zynq_pgs::order::{Order, Ties};
 use zynq_pgs::{Capabilities, StepParameters};
+
+use crate::permutation::{Arranger, Permutation};
 
 /// The order of a step's collisions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub(crate) struct OrderingArgs {
     /// Order in which the collisions are sent [default: auto]
-    #[arg(long, value_enum)]
-    pub(crate) order: Option<OrderName>,
+    #[arg(long, value_name = "ORDER", value_parser = AskedParser)]
+    pub(crate) order: Option<AskedOrder>,
     /// Prove before each step that no moving body recurs within the hazard window; refuse the step
     /// otherwise
     #[arg(long)]
     pub(crate) verify: bool,
 }
 
-/// An order of the collisions.
+/// An order that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AskedOrder {
+    /// One that the driver makes.
+    Driver(OrderName),
+    /// One that the command makes; the driver sends the collisions as given.
+    Command(Permutation),
+}
+
+/// An order of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
     /// Fewest cycles on the board: hazard-free-nearby (without empty entries if the pipeline waits
@@ -55,19 +70,76 @@ impl OrderName {
     }
 
     /// The name as written.
-    pub(crate) fn text(self) -> String {
+    fn text(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
+}
 
-    /// Parses a word of a text: a name, or a name behind `order=`.
-    pub(crate) fn of_word(word: &str) -> Option<Self> {
-        Self::from_str(word.strip_prefix("order=").unwrap_or(word), false).ok()
+impl AskedOrder {
+    /// The driver's order of a step.
+    fn order(self) -> Option<Order> {
+        match self {
+            Self::Driver(name) => name.order(),
+            Self::Command(_) => Some(Order::AsGiven),
+        }
     }
 
-    /// Lists all names.
+    /// As it is written.
+    pub(crate) fn text(self) -> String {
+        match self {
+            Self::Driver(name) => name.text(),
+            Self::Command(permutation) => permutation.text(),
+        }
+    }
+
+    /// Parses a word of a text: an order, or an order behind `order=`.
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        let word = word.strip_prefix("order=").unwrap_or(word);
+        let command = || Permutation::of_word(word).map(Self::Command);
+        OrderName::from_str(word, false).ok().map(Self::Driver).or_else(command)
+    }
+
+    /// Lists all orders as they are written.
     pub(crate) fn all() -> String {
-        let names: Vec<String> = Self::value_variants().iter().map(|name| name.text()).collect();
-        names.join(", ")
+        let names = OrderName::value_variants().iter().map(|name| name.text());
+        let forms = Permutation::FORMS.iter().map(|(form, _)| (*form).to_owned());
+        names.chain(forms).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Parses an order of the command line, and lists all of them in its help.
+#[derive(Debug, Clone, Copy)]
+struct AskedParser;
+
+impl TypedValueParser for AskedParser {
+    type Value = AskedOrder;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<AskedOrder, clap::Error> {
+        let text = StringValueParser::new().parse_ref(command, argument, value)?;
+        let order = Some(&text).filter(|text| !text.starts_with("order="));
+        order.and_then(|text| AskedOrder::of_word(text)).ok_or_else(|| {
+            let mut error = clap::Error::new(ErrorKind::InvalidValue).with_cmd(command);
+            if let Some(argument) = argument {
+                let argument = ContextValue::String(argument.to_string());
+                error.insert(ContextKind::InvalidArg, argument);
+            }
+            error.insert(ContextKind::InvalidValue, ContextValue::String(text.clone()));
+            let valid = AskedOrder::all().split(", ").map(str::to_owned).collect();
+            error.insert(ContextKind::ValidValue, ContextValue::Strings(valid));
+            error
+        })
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = OrderName::value_variants().iter().filter_map(OrderName::to_possible_value);
+        let forms = Permutation::FORMS;
+        let forms = forms.into_iter().map(|(form, help)| PossibleValue::new(form).help(help));
+        Some(Box::new(names.chain(forms)))
     }
 }
 
@@ -79,6 +151,20 @@ impl OrderingArgs {
         }
         parameters.verify_order |= self.verify;
         parameters
+    }
+
+    /// What puts the collisions in order before the driver gets them, if the command does. `recorded` is
+    /// the order of Bullet's GPU, where it is known.
+    pub(crate) fn arranger(self, recorded: Option<Vec<u32>>) -> Option<Arranger> {
+        self.permutation().map(|permutation| Arranger::new(permutation, recorded))
+    }
+
+    /// The order that the command makes, if it does.
+    pub(crate) fn permutation(self) -> Option<Permutation> {
+        match self.order {
+            Some(AskedOrder::Command(permutation)) => Some(permutation),
+            Some(AskedOrder::Driver(_)) | None => None,
+        }
     }
 
     /// Sets the order of a step whose results are compared. If no order is given, and the board
@@ -114,23 +200,36 @@ mod tests {
 
     #[test]
     fn every_name_is_told_as_it_is_asked_for() {
-        for order in OrderName::value_variants() {
-            assert_eq!(OrderName::of_word(&order.text()), Some(*order));
-            assert_eq!(OrderName::of_word(&format!("order={}", order.text())), Some(*order));
-            if let Some(asked) = order.order() {
-                assert_eq!(name(asked), order.text());
+        for name in OrderName::value_variants() {
+            let asked = AskedOrder::Driver(*name);
+            assert_eq!(AskedOrder::of_word(&asked.text()), Some(asked));
+            assert_eq!(AskedOrder::of_word(&format!("order={}", asked.text())), Some(asked));
+            if let Some(order) = asked.order() {
+                assert_eq!(super::name(order), asked.text());
             }
-            assert!(OrderName::all().contains(&order.text()));
+            assert!(AskedOrder::all().contains(&asked.text()));
         }
-        assert_eq!(OrderName::of_word("sorted"), None);
+        assert_eq!(AskedOrder::of_word("sorted"), None);
+    }
+
+    #[test]
+    fn an_order_of_the_command_is_sent_as_given() {
+        for permutation in [Permutation::Gpu, Permutation::Random(9)] {
+            let asked = AskedOrder::of_word(&permutation.text()).expect("an order");
+            assert_eq!(asked, AskedOrder::Command(permutation));
+            let ordering = OrderingArgs { order: Some(asked), verify: false };
+            assert_eq!(ordering.apply(StepParameters::default()).order, Some(Order::AsGiven));
+            assert!(ordering.arranger(None).is_some());
+        }
+        assert!(OrderingArgs::default().arranger(None).is_none());
     }
 
     #[test]
     fn nothing_asked_for_changes_nothing() {
         let parameters = StepParameters::default();
         assert_eq!(OrderingArgs::default().apply(parameters), parameters);
-        let asked = OrderingArgs { order: Some(OrderName::Colours), verify: true };
-        let asked = asked.apply(parameters);
+        let order = Some(AskedOrder::Driver(OrderName::Colours));
+        let asked = OrderingArgs { order, verify: true }.apply(parameters);
         assert_eq!((asked.order, asked.verify_order), (Some(Order::Colours), true));
     }
 }

@@ -9,9 +9,11 @@ pub(crate) mod list;
 pub(crate) mod load;
 pub(crate) mod model;
 pub(crate) mod order;
+pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
+pub(crate) mod study;
 
 use std::io::Write;
 
@@ -26,9 +28,11 @@ use self::list::ListArgs;
 use self::load::LoadArgs;
 use self::model::ModelArgs;
 use self::order::OrderArgs;
+use self::report::ReportArgs;
 use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
+use self::study::StudyArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 
@@ -42,6 +46,8 @@ pub(crate) enum Verb {
     Formats(FormatsArgs),
     Model(ModelArgs),
     Order(OrderArgs),
+    Report(ReportArgs),
+    Study(StudyArgs),
     List(ListArgs),
     Load(LoadArgs),
     Serve(ServeArgs),
@@ -60,6 +66,8 @@ impl Verb {
             Self::Formats(args) => formats::run(args, common, out),
             Self::Model(args) => model::run(args, common, out),
             Self::Order(args) => order::run(args, common, out),
+            Self::Report(args) => report::run(args, common, out),
+            Self::Study(args) => study::run(args, common, out),
             Self::List(args) => list::run(args, common, out),
             Self::Load(args) => load::run(args, common, out),
             Self::Serve(args) => serve::run(args, common, out),

@@ -23,7 +23,9 @@ use crate::output::SCHEMA;
 use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::{limit_text, milliseconds};
+use crate::permutation::{self, Permutation};
 use crate::step_input;
+use crate::traced::TracedArgs;
 use step_folder::digest;
 use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use step_folder::npy::{self, Dimensions};
@@ -36,6 +38,7 @@ Examples:
   pgs solve vectors/one_cube --compare
   pgs solve vectors/pile10_step90 --out result --digest
   pgs solve vectors/pile10_step90 --hazards unchecked --verify
+  pgs solve vectors/one_cube --vcd step.vcd --trace step.json --timeline step.svg
   pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
   pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
 
@@ -102,6 +105,8 @@ pub(crate) struct SolveArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    traced: TracedArgs,
 }
 
 impl SolveArgs {
@@ -150,13 +155,45 @@ pub(crate) fn run(
     let mut opened = board::open(common, &args.build.build())?;
     folder.check_shapes(opened.accelerator.capabilities().shapes_max()).map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
+    let tracing = args.traced.tracing(&opened)?;
     opened.inject(&args.planned, &parameters)?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
-    let stepped = step_input::set_shapes(&mut opened.accelerator, &folder.shapes)
-        .and_then(|()| opened.accelerator.step(&mut bodies, &folder.collisions, &parameters));
+    let permutation = args.ordering.permutation();
+    let recorded = match permutation {
+        Some(Permutation::Gpu) => permutation::recorded(&folder.path, folder.collisions.len())?,
+        _ => None,
+    };
+    let mut arranger = args.ordering.arranger(recorded);
+    let accelerator = &mut opened.accelerator;
+    let stepped = step_input::set_shapes(accelerator, &folder.shapes).and_then(|()| {
+        if let Some(tracing) = &tracing {
+            tracing.begin();
+        }
+        match &mut arranger {
+            None => accelerator.step(&mut bodies, &folder.collisions, &parameters),
+            Some(arranger) => {
+                let arranged = arranger.arrange(&bodies, &folder.shapes, &folder.collisions);
+                let stepped = accelerator.step(&mut bodies, arranged, &parameters);
+                // The same refusal names the place in the folder.
+                match stepped {
+                    Err(error) if error.is_input() => {
+                        let folders = &folder.collisions;
+                        Err(accelerator
+                            .step(&mut bodies, folders, &parameters)
+                            .err()
+                            .unwrap_or(error))
+                    }
+                    stepped => stepped,
+                }
+            }
+        }
+    });
+    if let Some(tracing) = &tracing {
+        tracing.end(stepped.as_ref().ok())?;
+    }
     if stepped.is_ok() {
         opened.alive()?;
     }
@@ -179,11 +216,12 @@ pub(crate) fn run(
     }
 
     let beside_bullet = match args.compare {
-        true => order::beside_bullet(&report, opened.accelerator.capabilities()),
+        true => order::beside_bullet(&report, opened.accelerator.capabilities(), permutation),
         false => None,
     };
     let solved = StepResult {
         parameters,
+        permutation,
         beside_bullet,
         report,
         energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
@@ -196,6 +234,7 @@ pub(crate) fn run(
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
         document["faults"] = opened.faults_json();
+        document["traced"] = args.traced.to_json();
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
@@ -206,6 +245,7 @@ pub(crate) fn run(
             writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
+        args.traced.print(out)?;
     }
     if args.digest && !equal {
         for difference in solved.differences.iter().filter(|d| d.differing > 0) {
@@ -290,6 +330,8 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
 /// The result of the step.
 struct StepResult {
     parameters: StepParameters,
+    /// The order that the command has made, if it has.
+    permutation: Option<Permutation>,
     /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
@@ -318,7 +360,7 @@ impl StepResult {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
-        let mut order = order::text(report);
+        let mut order = order::text(report, self.permutation);
         if let Some(text) = self.beside_bullet.map(str::to_owned).or(order::reason(report)) {
             order += &format!(" ({text})");
         }
@@ -395,6 +437,7 @@ impl StepResult {
                 "contact_iterations": self.parameters.contact_iterations,
                 "friction_iterations": self.parameters.friction_iterations,
                 "integrate": self.parameters.integrate,
+                "permutation": self.permutation.map(Permutation::text),
             },
             "step": crate::output::report_json(&self.report),
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),

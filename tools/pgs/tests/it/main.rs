@@ -27,4 +27,7 @@ mod run;
 mod saturated;
 mod serve;
 mod signals;
+mod study;
+mod study_more;
 mod threads;
+mod traced;

@@ -29,6 +29,7 @@ const EXAMPLES: &str = "\
 Examples:
   pgs compare float float,unchecked --grid 10x10x10 --steps 200
   pgs compare float,hazard-free float,unchecked,as-given --input vectors/full_step186
+  pgs compare float,gpu float,as-given --input vectors/full_step186
   pgs compare float half --input vectors/full_step186
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
@@ -39,7 +40,7 @@ change is a word: binary16, thesis16 (numbers on 16-bit streams), f32 (arithmeti
 unchecked, keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
 length-width=BITS, address-width=BITS, threads=N and lanes=on|off. The order of a board's collisions
 is one of auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest,
-body-by-body-newest, colours. Without an order, a board that waits on hazards takes the collisions
+body-by-body-newest, colours, gpu, random=SEED (see `pgs solve --help`). Without an order, a board that waits on hazards takes the collisions
 as given, so that two such boards solve them in the same order. Each board detects its own
 collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in model.
 

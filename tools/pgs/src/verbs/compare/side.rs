@@ -10,9 +10,10 @@ use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters,
 use super::spec::SideSpec;
 use crate::board::{self, OpenBoard};
 use crate::common::{BoardName, CommonArgs};
-use crate::deviation::unmoved_share;
+use crate::deviation::{moving, unmoved_share};
 use crate::failure::Failure;
-use crate::narrow::NarrowFormat;
+use crate::narrow::carried;
+use crate::permutation::{self, Arranger, Permutation};
 use crate::step_input;
 use step_folder::digest;
 use step_folder::folder::Folder;
@@ -42,12 +43,7 @@ impl World<'_> {
 
     /// Whether each body can move.
     pub(super) fn moving(&self) -> Vec<bool> {
-        let shapes = self.shapes();
-        let moves = |body: &Body| {
-            let shape = usize::try_from(body.shape).ok().and_then(|index| shapes.get(index));
-            shape.is_some_and(|shape| shape.inverse_mass != 0.0)
-        };
-        self.bodies().iter().map(moves).collect()
+        moving(self.bodies(), self.shapes())
     }
 }
 
@@ -107,6 +103,7 @@ pub(super) struct Side<'a> {
     pub(super) opened: OpenBoard,
     pub(super) world: World<'a>,
     pub(super) failed: Option<Failed>,
+    arranger: Option<Arranger>,
     gravity: [f32; 3],
 }
 
@@ -130,7 +127,14 @@ impl<'a> Side<'a> {
         };
         let (opened, world) =
             begin().map_err(|failure: Failure| failure.about(format!("board {name} ({spec})")))?;
-        Ok(Self { name, spec, opened, world, failed: None, gravity })
+        let recorded = match (&world, spec.ordering.permutation()) {
+            (World::Folder { folder, .. }, Some(Permutation::Gpu)) => {
+                permutation::recorded(&folder.path, folder.collisions.len())?
+            }
+            _ => None,
+        };
+        let arranger = spec.ordering.arranger(recorded);
+        Ok(Self { name, spec, opened, world, failed: None, arranger, gravity })
     }
 
     /// Detects the collisions of the first step and measures the start.
@@ -156,15 +160,16 @@ impl<'a> Side<'a> {
         let parameters = &self.spec.ordering.apply_to_compare(*parameters, capabilities);
         let before = self.world.bodies().to_vec();
         let accelerator = &mut self.opened.accelerator;
-        let stepped = match &mut self.world {
-            World::Scene(scene) => {
-                let (bodies, collisions) = scene.parts_mut();
-                accelerator.step(bodies, collisions, parameters)
-            }
-            World::Folder { folder, bodies } => {
-                accelerator.step(bodies, &folder.collisions, parameters)
-            }
+        let shapes = self.world.shapes().to_vec();
+        let (bodies, collisions) = match &mut self.world {
+            World::Scene(scene) => scene.parts_mut(),
+            World::Folder { folder, bodies } => (&mut bodies[..], &folder.collisions[..]),
         };
+        let collisions = match &mut self.arranger {
+            Some(arranger) => arranger.arrange(bodies, &shapes, collisions),
+            None => collisions,
+        };
+        let stepped = accelerator.step(bodies, collisions, parameters);
         let report = match stepped {
             Ok(report) => report,
             Err(error) => {
@@ -203,8 +208,7 @@ impl<'a> Side<'a> {
 
     /// Rounds a number as the streams of the bodies do.
     fn carried(&self, value: f32) -> f32 {
-        let format = self.spec.build.config().variant().numbers.poses;
-        NarrowFormat::of(format).and_then(|format| format.round_trip(value)).unwrap_or(value)
+        carried(self.spec.build.config().variant().numbers.poses, value)
     }
 
     pub(super) fn digest(&self) -> String {

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use zynq_pgs::emulation::{Build, BuildError};
 
-use crate::options::ordering::{OrderName, OrderingArgs};
+use crate::options::ordering::{AskedOrder, OrderingArgs};
 
 /// The specification of a side: the build of its board, and the order of its collisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,14 +22,14 @@ impl FromStr for SideSpec {
         let mut order = None;
         let mut rest = Vec::new();
         for (place, word) in text.split(',').enumerate() {
-            match OrderName::of_word(word) {
+            match AskedOrder::of_word(word) {
                 Some(_) if order.is_some() => return Err("order is given twice".to_owned()),
                 Some(name) if place > 0 => order = Some(name),
                 _ => rest.push(word),
             }
         }
         let build = rest.join(",").parse().map_err(|error: BuildError| {
-            format!("{error}; orders of the collisions are {}", OrderName::all())
+            format!("{error}; orders of the collisions are {}", AskedOrder::all())
         })?;
         Ok(Self { build, ordering: OrderingArgs { order, verify: false } })
     }

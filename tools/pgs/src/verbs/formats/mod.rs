@@ -10,8 +10,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
-use self::numbers::{AS_STREAMED, EACH_ONCE, Numbers, SUMS, numbers};
-use self::tally::{Loss, Sizes};
+use self::numbers::{AS_STREAMED, Numbers, SUMS};
+pub(crate) use self::numbers::{EACH_ONCE, numbers};
+pub(crate) use self::tally::{Loss, Sizes};
 use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};

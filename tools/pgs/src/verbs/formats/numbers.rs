@@ -4,7 +4,7 @@ use zynq_pgs::{Body, CONTACT_POINTS, Collision, Shape};
 
 /// The sums that include a kind of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Membership {
+pub(crate) enum Membership {
     /// In both sums.
     Given,
     /// Streamed with every collision, although the bodies have these numbers already.
@@ -14,37 +14,37 @@ pub(super) enum Membership {
 }
 
 /// A sum over kinds of numbers.
-pub(super) struct Sum {
-    pub(super) name: &'static str,
+pub(crate) struct Sum {
+    pub(crate) name: &'static str,
     /// Whether the sum includes a part.
-    pub(super) has: fn(Membership) -> bool,
+    pub(crate) has: fn(Membership) -> bool,
 }
 
 /// The numbers that a step streams, with the positions of both bodies in every collision.
-pub(super) const AS_STREAMED: Sum =
+pub(crate) const AS_STREAMED: Sum =
     Sum { name: "as streamed", has: |part| part != Membership::Relative };
 /// Every input number of a step, once.
-pub(super) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Membership::Given };
+pub(crate) const EACH_ONCE: Sum = Sum { name: "each once", has: |part| part == Membership::Given };
 /// Both sums.
-pub(super) const SUMS: [Sum; 2] = [AS_STREAMED, EACH_ONCE];
+pub(crate) const SUMS: [Sum; 2] = [AS_STREAMED, EACH_ONCE];
 
 impl Sum {
     /// The numbers of the sum.
-    pub(super) fn of<'a>(&self, kinds: &'a [Numbers]) -> impl Iterator<Item = &'a f32> + Clone {
+    pub(crate) fn of<'a>(&self, kinds: &'a [Numbers]) -> impl Iterator<Item = &'a f32> + Clone {
         let has = self.has;
         kinds.iter().filter(move |kind| has(kind.part)).flat_map(|kind| &kind.values)
     }
 }
 
 /// The numbers of one kind.
-pub(super) struct Numbers {
-    pub(super) name: &'static str,
-    pub(super) part: Membership,
-    pub(super) values: Vec<f32>,
+pub(crate) struct Numbers {
+    pub(crate) name: &'static str,
+    pub(crate) part: Membership,
+    pub(crate) values: Vec<f32>,
 }
 
 /// The numbers of a step, kind by kind.
-pub(super) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision]) -> Vec<Numbers> {
+pub(crate) fn numbers(bodies: &[Body], shapes: &[Shape], collisions: &[Collision]) -> Vec<Numbers> {
     let of_bodies = |name, field: fn(&Body) -> &[f32]| Numbers {
         name,
         part: Membership::Given,

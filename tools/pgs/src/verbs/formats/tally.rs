@@ -14,18 +14,18 @@ const ONE_PERCENT: f64 = 0.01;
 
 /// The errors of a format.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Loss {
+pub(crate) struct Loss {
     numbers: u64,
     zeros: u64,
     /// Numbers outside the format's range.
-    pub(super) refused: u64,
+    pub(crate) refused: u64,
     relative_sum: f64,
     under: u64,
-    pub(super) largest_absolute: f64,
+    pub(crate) largest_absolute: f64,
 }
 
 impl Loss {
-    pub(super) fn of<'a>(format: NarrowFormat, values: impl Iterator<Item = &'a f32>) -> Self {
+    pub(crate) fn of<'a>(format: NarrowFormat, values: impl Iterator<Item = &'a f32>) -> Self {
         let mut loss = Self::default();
         for &value in values {
             loss.numbers += 1;
@@ -54,16 +54,16 @@ impl Loss {
     }
 
     /// Mean relative error.
-    pub(super) fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         if self.counted() == 0 { 0.0 } else { self.relative_sum / self.counted() as f64 }
     }
 
     /// Share of the counted numbers whose error is below 1 %.
-    pub(super) fn under_share(&self) -> f64 {
+    pub(crate) fn under_share(&self) -> f64 {
         share(self.under, self.counted())
     }
 
-    pub(super) fn to_json(self) -> Value {
+    pub(crate) fn to_json(self) -> Value {
         json!({
             "refused": self.refused,
             "relative_mean_percent": self.mean() * 100.0,
@@ -75,19 +75,19 @@ impl Loss {
 
 /// The sizes of numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Sizes {
-    pub(super) numbers: u64,
-    pub(super) zeros: u64,
+pub(crate) struct Sizes {
+    pub(crate) numbers: u64,
+    pub(crate) zeros: u64,
     /// Small numbers without zeros.
     small: u64,
-    pub(super) smallest: Option<f32>,
-    pub(super) largest: Option<f32>,
+    pub(crate) smallest: Option<f32>,
+    pub(crate) largest: Option<f32>,
     /// Numbers by their exponent of ten, without zeros.
-    pub(super) decades: BTreeMap<i32, u64>,
+    pub(crate) decades: BTreeMap<i32, u64>,
 }
 
 impl Sizes {
-    pub(super) fn of<'a>(values: impl Iterator<Item = &'a f32>) -> Self {
+    pub(crate) fn of<'a>(values: impl Iterator<Item = &'a f32>) -> Self {
         let mut sizes = Self::default();
         for size in values.map(|value| value.abs()) {
             sizes.numbers += 1;
@@ -108,12 +108,12 @@ impl Sizes {
     }
 
     /// Share of small numbers among all but zeros.
-    pub(super) fn small_share(&self) -> f64 {
+    pub(crate) fn small_share(&self) -> f64 {
         let others = self.numbers - self.zeros;
         if others == 0 { 0.0 } else { self.small as f64 / others as f64 }
     }
 
-    pub(super) fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let decades: Vec<Value> = self
             .decades
             .iter()

@@ -6,8 +6,8 @@ use bitstream_model::estimate::{MemoryUse, PortAccount, Records, StepTime};
 use bitstream_model::interface::profile::{FLOAT, MIXED, Variant};
 
 use super::ports::PUMP;
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib};
+use super::table::{Cell, Kind, Table, text};
 
 /// The table, if `mixed` is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {

@@ -11,8 +11,8 @@ use bitstream_model::estimate::thesis::recorded::{
 use bitstream_model::estimate::{Records, StepTime};
 use bitstream_model::interface::profile::Variant;
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference};
+use super::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![platforms(), against(scene)]

@@ -3,8 +3,8 @@
 use bitstream_model::estimate::thesis::data::{DataTable, TABLES};
 use bitstream_model::estimate::{Records, StepTraffic};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, printed_mib};
+use super::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let mut tables: Vec<Table> = TABLES.iter().map(|table| accounted(scene, table)).collect();

@@ -2,8 +2,8 @@
 
 use bitstream_model::estimate::thesis::euler::{exact, explicit, explicit_single};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::difference;
+use super::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables() -> Vec<Table> {
     let mut table = Table::new(

@@ -4,8 +4,8 @@ use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::Design;
 use bitstream_model::estimate::{BLOCKS, HP_PORTS, MemoryUse, StreamDemand};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, printed_mib, yes_or_no};
+use super::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![footprint(scene), arrays(scene), blocks(scene), logic(scene)]

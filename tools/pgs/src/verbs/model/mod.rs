@@ -8,10 +8,11 @@ mod estimate;
 mod euler;
 mod memory;
 mod ports;
-mod render;
-mod report;
+pub(crate) mod render;
+
 mod scene;
 mod step;
+pub(crate) mod table;
 mod warm;
 mod window;
 
@@ -29,8 +30,8 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
 use crate::options::build::number;
-use report::Table;
 use scene::Scene;
+use table::Table;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -186,6 +187,17 @@ impl ModelArgs {
             .filter(|s| self.section.is_empty() || self.section.contains(s))
             .collect()
     }
+}
+
+/// All tables of the thesis' step, for the report.
+#[cfg(feature = "report")]
+pub(crate) fn thesis_tables() -> Vec<Table> {
+    let scene = Scene {
+        step: StepShape::new(thesis::BODIES, thesis::COLLISIONS),
+        variants: PROFILES.iter().map(|profile| profile.default_variant()).collect(),
+        bandwidths: BANDWIDTHS.to_vec(),
+    };
+    Section::value_variants().iter().flat_map(|section| section.tables(&scene)).collect()
 }
 
 /// Computes and shows the tables.

@@ -3,8 +3,8 @@
 
 use bitstream_model::estimate::{Access, AccessKind, PortAccount, PortUse, Slot};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, yes_or_no};
+use super::table::{Cell, Kind, Table, text};
 
 /// The pump's demands on the device, and what is known of them.
 pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 MHz), is \

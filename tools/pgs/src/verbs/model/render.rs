@@ -2,13 +2,14 @@
 
 use std::io::{self, Write};
 
-use super::report::{Cell, Table};
+use super::table::{Cell, Table};
 use crate::numbers::grouped;
 
 /// Column before which notes are broken.
 const WIDTH: usize = 100;
 
-fn shown(cell: &Cell) -> String {
+/// A cell as people read it.
+pub(crate) fn shown(cell: &Cell) -> String {
     match cell {
         // A share of nothing is not finite.
         Cell::Number(value, _) | Cell::Difference(value) | Cell::Share(value)
@@ -32,7 +33,7 @@ fn shown(cell: &Cell) -> String {
 }
 
 /// Whether a column is flush right: columns with a number are, columns of words are not.
-fn at_right(table: &Table, column: usize) -> bool {
+pub(crate) fn at_right(table: &Table, column: usize) -> bool {
     let number = |cell: &Cell| !matches!(cell, Cell::Text(_) | Cell::Missing);
     table.rows.iter().any(|row| number(&row[column]))
 }
@@ -86,7 +87,7 @@ pub(super) fn terminal(out: &mut dyn Write, table: &Table) -> io::Result<()> {
 }
 
 /// Writes a table as Markdown.
-pub(super) fn markdown(out: &mut dyn Write, table: &Table) -> io::Result<()> {
+pub(crate) fn markdown(out: &mut dyn Write, table: &Table) -> io::Result<()> {
     let escaped = |text: &str| text.replace('|', "\\|");
     writeln!(out, "### {}\n", table.title)?;
     let heads: Vec<String> = table.columns.iter().map(|column| escaped(column.head)).collect();
@@ -110,7 +111,7 @@ pub(super) fn markdown(out: &mut dyn Write, table: &Table) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::text;
+    use super::super::table::text;
     use super::*;
 
     fn table() -> Table {

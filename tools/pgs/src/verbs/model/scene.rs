@@ -4,7 +4,7 @@ use bitstream_model::Bandwidth;
 use bitstream_model::estimate::{StepShape, thesis};
 use bitstream_model::interface::profile::Variant;
 
-use super::report::Cell;
+use super::table::Cell;
 
 /// The subject of the tables.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@ use bitstream_model::estimate::thesis::recorded::{Design, MEMORY_BANDWIDTH};
 use bitstream_model::estimate::{MemoryUse, Records, StepCycles, StepTime};
 use bitstream_model::interface::profile::{Inertia, Variant};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, difference, mib, yes_or_no};
+use super::table::{Cell, Kind, Table, text};
 use super::window::has_window;
 use crate::options::bandwidth::bandwidth_text;
 

@@ -2,8 +2,8 @@
 
 use bitstream_model::estimate::{WarmCost, WarmStart};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::Scene;
+use super::table::{Cell, Kind, Table, text};
 
 /// The table, if one of the profiles has a warm start.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {

@@ -6,8 +6,8 @@ use bitstream_model::estimate::{
 };
 use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
 
-use super::report::{Cell, Kind, Table, text};
 use super::scene::{Scene, mib, yes_or_no};
+use super::table::{Cell, Kind, Table, text};
 
 /// Whether a profile streams the collisions once.
 pub(super) fn has_window(flow: &Flow) -> bool {

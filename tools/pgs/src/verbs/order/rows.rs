@@ -8,6 +8,7 @@ use zynq_pgs::order::{
 
 use super::cost;
 use super::source::Source;
+use crate::permutation::shuffled;
 
 /// Seed of the random order; any number does.
 const SEED: u64 = 20_260_101;
@@ -95,7 +96,7 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
         kinds.push(("Bullet's GPU batches".to_owned(), fixed(order.clone())));
     }
     kinds.extend([
-        ("random".to_owned(), fixed(shuffled(input.pairs.len()))),
+        ("random".to_owned(), fixed(shuffled(&mut SplitMix64::new(SEED), input.pairs.len()))),
         ("thesis, lowest index".to_owned(), thesis(Ties::LowestIndex)),
         ("thesis, oldest".to_owned(), thesis(Ties::Oldest)),
         ("thesis, newest".to_owned(), thesis(Ties::Newest)),
@@ -104,29 +105,4 @@ fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
         ("hazard-free-nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
     ]);
     Ok(kinds)
-}
-
-/// Fisher and Yates' shuffle.
-fn shuffled(count: usize) -> Vec<u32> {
-    let mut random = SplitMix64::new(SEED);
-    let mut order: Vec<u32> = (0..).take(count).collect();
-    for k in (1..count).rev() {
-        order.swap(k, random.below(k + 1));
-    }
-    order
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shuffle_is_a_permutation_and_far_from_the_order_given() {
-        let order = shuffled(1000);
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert_eq!(sorted, (0..1000).collect::<Vec<_>>());
-        let near = (0..).zip(&order).filter(|(k, index)| u32::abs_diff(*k, **index) < 100);
-        assert!(near.count() < 300);
-    }
 }

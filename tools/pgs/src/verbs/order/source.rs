@@ -13,12 +13,9 @@ use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
 use crate::options::scenes;
+use crate::permutation;
 use crate::step_input;
 use step_folder::folder::Folder;
-use step_folder::npy::{self, Dimensions};
-
-/// The order of the collisions on Bullet's GPU, if the folder has it.
-const GPU_ORDER: &str = "gpu_order.npy";
 
 /// Collisions to be ordered.
 pub(super) struct Source {
@@ -62,7 +59,7 @@ impl Source {
 
     fn folder(path: &Path) -> Result<Self, Failure> {
         let folder = step_input::load(path)?;
-        let gpu_order = gpu_order(&path.join(GPU_ORDER), folder.collisions.len())?;
+        let gpu_order = permutation::recorded(path, folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
         Ok(Self::new(path.display().to_string(), &bodies, &collisions, &shapes, gpu_order))
     }
@@ -108,25 +105,4 @@ impl Source {
         });
         uses.count() as f64 / (self.moving() as f64).max(1.0)
     }
-}
-
-/// Reads a permutation of `count` collisions, if the file exists.
-fn gpu_order(path: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
-    // Opening the file reports a name that cannot be looked up.
-    if matches!(path.try_exists(), Ok(false)) {
-        return Ok(None);
-    }
-    let shape = Dimensions(vec![Some(count)]);
-    let (_, order) = npy::read::<u32>(path, &shape).map_err(Failure::input)?;
-    let mut seen = vec![false; count];
-    for (place, index) in order.iter().enumerate() {
-        let first = usize::try_from(*index).ok().and_then(|index| seen.get_mut(index));
-        if first.is_none_or(|seen| std::mem::replace(seen, true)) {
-            let path = path.display();
-            return Err(Failure::input(format!(
-                "{path}: expected each index below {count} once, found {index} at {place}"
-            )));
-        }
-    }
-    Ok(Some(order))
 }

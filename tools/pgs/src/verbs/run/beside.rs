@@ -8,6 +8,7 @@ use zynq_pgs::{Accelerator, StepParameters};
 use super::row::{Row, step};
 use super::summary::FinalState;
 use crate::output::table::Column;
+use crate::permutation::Arranger;
 
 /// The columns that the scene adds to the table of the run.
 pub(super) const COLUMNS: [Column; 2] = [
@@ -19,6 +20,8 @@ pub(super) const COLUMNS: [Column; 2] = [
 pub(super) struct Cold {
     scene: Scene,
     parameters: StepParameters,
+    /// The order of the run.
+    arranger: Option<Arranger>,
     last: Option<Row>,
 }
 
@@ -33,13 +36,17 @@ pub(super) struct Beside {
 
 impl Cold {
     /// A scene that is stepped with the parameters of the run, but for a warm start and frictions.
-    pub(super) fn new(scene: Scene, parameters: &StepParameters) -> Self {
+    pub(super) fn new(
+        scene: Scene,
+        parameters: &StepParameters,
+        arranger: Option<Arranger>,
+    ) -> Self {
         let parameters = parameters
             .with_warm_start(false)
             .with_impulses_out(false)
             .with_pair_friction(false)
             .with_shape_friction(false);
-        Self { scene, parameters, last: None }
+        Self { scene, parameters, arranger, last: None }
     }
 
     /// Takes a step; none if Ctrl-C ended it.
@@ -48,8 +55,8 @@ impl Cold {
         number: u32,
         accelerator: &mut Accelerator,
     ) -> Result<Option<Beside>, zynq_pgs::Error> {
-        let Self { scene, parameters, last } = self;
-        let row = step(number, parameters, accelerator, scene, None)?;
+        let Self { scene, parameters, arranger, last } = self;
+        let row = step(number, parameters, accelerator, scene, None, arranger.as_mut())?;
         let of = |row: &Row| Beside { deepest: row.deepest, kinetic_energy: row.before_gravity };
         let beside = row.as_ref().map(of);
         if row.is_some() {

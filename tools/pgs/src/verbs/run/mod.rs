@@ -1,6 +1,7 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod beside;
+mod energy;
 mod row;
 mod summary;
 
@@ -33,6 +34,8 @@ use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
+use crate::permutation::Permutation;
+use crate::traced::{TracedArgs, Tracing};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -43,6 +46,7 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
+  pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     without extensions of 1.2
@@ -50,6 +54,7 @@ Examples:
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
+  pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -109,6 +114,11 @@ pub(crate) struct RunArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    traced: TracedArgs,
+    /// Step to show the inside of [default: the last]
+    #[arg(long, value_name = "N", help_heading = "Inside a step (emulated board)", value_parser = clap::value_parser!(u32).range(1..))]
+    traced_step: Option<u32>,
 }
 
 impl RunArgs {
@@ -143,6 +153,20 @@ impl RunArgs {
         self.steps.unwrap_or(if self.scene.is_cubes() { cubes } else { shapes })
     }
 
+    /// The board whose step is recorded, and the number of the step.
+    fn tracing(&self, opened: &OpenBoard) -> Result<Option<(Tracing<'_>, u32)>, Failure> {
+        let (step, steps) = (self.traced_step.unwrap_or(self.steps()), self.steps());
+        if self.traced_step.is_some() && !self.traced.is_given() {
+            let error = "--traced-step names a step of which no file is to be written";
+            return Err(Failure::input(error).next("add --vcd, --trace or --timeline FILE"));
+        }
+        if step > steps {
+            let error = format!("--traced-step is {step}, and the run has {steps} steps");
+            return Err(Failure::input(error).next("name an earlier step, or take more steps"));
+        }
+        Ok(self.traced.tracing(opened)?.map(|tracing| (tracing, step)))
+    }
+
     /// The scene that is stepped beside this one, if one is. A planned fault names a step of the board
     /// by its number, and the steps of a second scene would shift the numbers.
     fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
@@ -150,7 +174,8 @@ impl RunArgs {
         let shown = shown && !self.wide;
         let wanted = self.beside_cold.unwrap_or(shown);
         let scene = || self.scene.build(&self.build.build());
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
+        let arranger = self.ordering.arranger(None);
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
     }
 }
 
@@ -167,6 +192,8 @@ struct Course {
     last: Option<Row>,
     /// The scene beside it.
     cold: Option<Cold>,
+    /// The energy of a step, for people and for programs.
+    energy: Option<(String, Value)>,
 }
 
 /// Steps the scene.
@@ -183,14 +210,18 @@ pub(crate) fn run(
     if parameters.pair_friction || parameters.shape_friction {
         args.scene.give_frictions(&mut scene, &parameters)?;
     }
+    let tracing = args.tracing(&opened)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
 
+    let meter = energy::start(is_emulated(&opened));
     let scenes = (&mut scene, &mut course);
-    take_steps(args, common, &parameters, &mut opened, scenes, &interrupt, out)?;
+    let with = (&parameters, tracing.as_ref());
+    take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
+    course.energy = Some(energy::end(meter, course.done, course.totals.mean()));
     let complete = course.done == args.steps();
     if common.json {
         let document = document(args, &parameters, &opened, &mut scene, course, complete);
@@ -205,7 +236,7 @@ pub(crate) fn run(
 fn take_steps(
     args: &RunArgs,
     common: &CommonArgs,
-    parameters: &StepParameters,
+    (parameters, tracing): (&StepParameters, Option<&(Tracing<'_>, u32)>),
     opened: &mut OpenBoard,
     (scene, course): (&mut Scene, &mut Course),
     interrupt: &Interrupt,
@@ -214,10 +245,20 @@ fn take_steps(
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
+    let mut arranger = args.ordering.arranger(None);
     while course.done < args.steps() && !interrupt.is_set() {
-        let row =
-            step(course.done + 1, parameters, &mut opened.accelerator, scene, memory.as_mut())
-                .map_err(|error| args.faults.failure(opened, parameters, error))?;
+        let number = course.done + 1;
+        let tracing = tracing.filter(|(_, step)| *step == number).map(|(tracing, _)| tracing);
+        if let Some(tracing) = tracing {
+            tracing.begin();
+        }
+        let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
+        let row = step(number, parameters, &mut opened.accelerator, scene, memory, arranger);
+        if let Some(tracing) = tracing {
+            let row = row.as_ref().ok().and_then(Option::as_ref);
+            tracing.end(row.map(|row| &row.report))?;
+        }
+        let row = row.map_err(|error| args.faults.failure(opened, parameters, error))?;
         opened.alive()?;
         let Some(row) = row else { break };
         let mut beside = None;
@@ -284,7 +325,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &order::with_reason(first))?;
+    fact(out, "order", &order::with_reason(first, args.ordering.permutation()))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,
@@ -334,6 +375,9 @@ fn print_end(
     if let Some(summary) = summary(args, parameters, opened, scene, course) {
         summary.print(out)?;
     }
+    if let Some((energy, _)) = &course.energy {
+        fact(out, "energy", energy)?;
+    }
     if let Some(cold) = cold {
         fact(out, "cold", &cold)?;
     }
@@ -360,6 +404,7 @@ fn document(
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
     config["spin_damping"] = parameters.spin_damping.into();
+    config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
     config["shape_friction"] = parameters.shape_friction.into();
@@ -377,7 +422,9 @@ fn document(
         "steps": steps,
         "summary": summary.map(|summary| summary.to_json()),
         "beside_cold": cold,
+        "energy": course.energy.as_ref().map(|(_, energy)| energy),
         "faults": opened.faults_json(),
+        "traced": args.traced.to_json(),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },
     })

@@ -84,7 +84,7 @@ impl Totals {
     }
 
     /// Mean time of a step on the board, ms.
-    fn mean(&self) -> f64 {
+    pub(super) fn mean(&self) -> f64 {
         milliseconds(self.modelled) / f64::from(self.steps.max(1))
     }
 

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 /// The origin of a row's figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// Counted.
     Exact,
     /// Computed by a cycle, memory or bandwidth model.
@@ -16,7 +16,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) fn cell(self) -> Cell {
+    pub(crate) fn cell(self) -> Cell {
         text(match self {
             Self::Exact => "exact",
             Self::Modelled => "modelled",
@@ -28,7 +28,7 @@ impl Kind {
 
 /// The content of a table's cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Cell {
+pub(crate) enum Cell {
     Text(String),
     Whole(u64),
     /// A number, and its digits behind the point.
@@ -41,7 +41,7 @@ pub(super) enum Cell {
     Missing,
 }
 
-pub(super) fn text(value: impl Into<String>) -> Cell {
+pub(crate) fn text(value: impl Into<String>) -> Cell {
     Cell::Text(value.into())
 }
 
@@ -58,24 +58,24 @@ impl Cell {
 
 /// A column: its JSON key, and its heading.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
-    pub(super) key: &'static str,
-    pub(super) head: &'static str,
+pub(crate) struct Column {
+    pub(crate) key: &'static str,
+    pub(crate) head: &'static str,
 }
 
 /// A table with its notes.
 #[derive(Debug, Clone)]
-pub(super) struct Table {
-    pub(super) id: &'static str,
-    pub(super) title: String,
-    pub(super) columns: Vec<Column>,
-    pub(super) rows: Vec<Vec<Cell>>,
-    pub(super) notes: Vec<String>,
+pub(crate) struct Table {
+    pub(crate) id: &'static str,
+    pub(crate) title: String,
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: Vec<Vec<Cell>>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Table {
     /// A table without rows; columns are (key, heading).
-    pub(super) fn new(
+    pub(crate) fn new(
         id: &'static str,
         title: impl Into<String>,
         columns: &[(&'static str, &'static str)],
@@ -84,17 +84,17 @@ impl Table {
         Self { id, title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
     }
 
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         let cells: Vec<Cell> = cells.into_iter().collect();
         debug_assert_eq!(cells.len(), self.columns.len(), "{}", self.id);
         self.rows.push(cells);
     }
 
-    pub(super) fn note(&mut self, note: impl Into<String>) {
+    pub(crate) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }
 
-    pub(super) fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let row = |cells: &Vec<Cell>| {
             let members = self.columns.iter().zip(cells);
             members

@@ -1,0 +1,195 @@
+//! A recording tells the course of a step to the clock, and changes nothing of it.
+
+use bitstream_model::recording::{ChannelRecording, Port, Recording, Span, Stage};
+use bitstream_model::{
+    Bandwidth, BoardConfig, Counts, Delays, Direction, Fault, FaultKind, PacketCount, StepPhase,
+    When,
+};
+use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
+
+use crate::common::scene::Step;
+use crate::common::sg::{Failure, Machine};
+use crate::common::shortcuts::{OTHERS, Visible, scene, visible};
+
+/// A step of a board of its own.
+struct Taken {
+    outcome: Result<Visible, Failure>,
+    counts: Counts,
+    packets: Vec<PacketCount>,
+    recording: Option<Recording>,
+}
+
+fn take(config: BoardConfig, step: &Step, record: bool) -> Taken {
+    let mut machine = Machine::new(config);
+    // A step before it and one after it are not recorded.
+    machine.step(step).expect("a step without a fault");
+    if record {
+        machine.host.board.record();
+    }
+    let outcome = machine.step(step).map(|outcome| visible(&outcome));
+    let packets = machine.host.board.packets();
+    let recording = machine.host.board.take_recording();
+    machine.step(step).expect("a step without a fault");
+    Taken { outcome, counts: machine.host.board.counts(), packets, recording }
+}
+
+fn recorded(config: BoardConfig, step: &Step) -> Taken {
+    let (bare, taken) = (take(config, step, false), take(config, step, true));
+    assert_eq!(taken.outcome, bare.outcome);
+    assert_eq!(taken.counts, bare.counts);
+    assert_eq!(taken.packets, bare.packets);
+    assert!(bare.recording.is_none());
+    let long_way = take(BoardConfig { shortcuts: false, ..config }, step, true);
+    assert_eq!(taken.recording, long_way.recording);
+    taken
+}
+
+fn small() -> Step {
+    Step { iterations: [2, 3], ..scene(40, 90, 7, false) }
+}
+
+fn board(profile: &'static Profile, bandwidth: Bandwidth) -> BoardConfig {
+    let delays = Delays { fifo_beats: 48, ..Delays::default() };
+    BoardConfig { profile, bandwidth, delays, ..BoardConfig::default() }
+}
+
+/// Beats, and beats with TLAST, of a channel; its states follow one another.
+fn beats_of(channel: &ChannelRecording, whole: Span) -> [u64; 2] {
+    let mut sum = [0; 2];
+    let mut at = whole.begin;
+    for state in &channel.port {
+        assert!(state.begin >= at, "{state:?} begins before {at}");
+        at = state.end_of_beats();
+        match state.port {
+            Port::Moves { beats, last, .. } => {
+                assert!(beats > 0);
+                sum = [sum[0] + beats, sum[1] + u64::from(last)];
+            }
+            Port::Rests { valid, ready } => assert!(!(valid && ready), "that would be a beat"),
+        }
+    }
+    assert!(at <= whole.end);
+    sum
+}
+
+#[test]
+fn a_recorded_step_is_the_step() {
+    let designs = [&FLOAT, &HALF, &MIXED, &NAIVE, &WINDOWED];
+    for profile in designs.into_iter().chain(OTHERS) {
+        for bandwidth in [Bandwidth::Unlimited, Bandwidth::BytesPerSecond(900_000_000)] {
+            recorded(board(profile, bandwidth), &small());
+        }
+    }
+}
+
+#[test]
+fn the_packets_have_the_beats_and_descriptors_that_the_board_counts() {
+    for (profile, length_width) in [(&FLOAT, 26), (&FLOAT, 10), (OTHERS[4], 26)] {
+        let config = BoardConfig { length_width, ..board(profile, Bandwidth::ZCU102_SUSTAINED) };
+        let Taken { packets, recording, .. } = recorded(config, &small());
+        let Recording { span, channels, .. } = recording.expect("it was recorded");
+        for channel in &channels {
+            let of_channel = |packet: &&PacketCount| {
+                (packet.core, packet.direction) == (channel.core, channel.direction)
+            };
+            let counted: Vec<_> = packets
+                .iter()
+                .filter(of_channel)
+                .map(|packet| (packet.phase, packet.beats, packet.descriptors))
+                .collect();
+            let found: Vec<_> = channel
+                .packets
+                .iter()
+                .map(|packet| (packet.phase, packet.beats, packet.descriptors))
+                .collect();
+            assert_eq!(found, counted);
+            let beats = counted.iter().map(|(_, beats, _)| beats).sum();
+            assert_eq!(beats_of(channel, span), [beats, counted.len() as u64]);
+            let descriptors: u32 = counted.iter().map(|(.., descriptors)| descriptors).sum();
+            assert_eq!(channel.descriptors.len(), descriptors as usize);
+            let bytes: u64 = channel.descriptors.iter().map(|one| u64::from(one.bytes)).sum();
+            assert_eq!(bytes, 16 * beats);
+            let ends = channel.packets.windows(2).all(|two| two[0].span.end <= two[1].span.begin);
+            assert!(ends, "{:?}", channel.packets);
+        }
+    }
+}
+
+#[test]
+fn the_stages_follow_one_another_and_share_the_counters() {
+    let Taken { outcome, recording, .. } =
+        recorded(board(&FLOAT, Bandwidth::ZCU102_SUSTAINED), &small());
+    let (_, [cycles, stalls, waits, _, hazards], ..) = outcome.expect("no fault");
+    let Recording { stages, waits: waited, .. } = recording.expect("it was recorded");
+    let names: Vec<_> = stages.iter().map(|stage| stage.stage).collect();
+    let passes = [Stage::Contact(1), Stage::Contact(2), Stage::Friction(1), Stage::Friction(2)];
+    assert_eq!(names[0], Stage::Load);
+    assert_eq!(names[1..5], passes);
+    assert_eq!(names[5..], [Stage::Friction(3), Stage::Integrate]);
+    assert!(stages.windows(2).all(|two| two[0].span.end == two[1].span.begin));
+    let sum = |of: fn(&bitstream_model::recording::StageSpan) -> u64| -> u64 {
+        stages.iter().map(of).sum()
+    };
+    assert_eq!(sum(|stage| stage.span.clocks()), cycles);
+    assert_eq!(sum(|stage| stage.stalls), stalls);
+    assert_eq!(sum(|stage| stage.hazards), hazards);
+    assert_eq!(sum(|stage| stage.waits), waits);
+    assert_eq!(waited.iter().map(|span| span.clocks()).sum::<u64>(), waits);
+    // A collision takes a clock or more.
+    assert!(stages[1..6].iter().all(|stage| stage.span.clocks() >= 90 && stage.stalls > 0));
+}
+
+#[test]
+fn the_interrupt_rises_once_after_the_last_beat_and_the_accesses_are_all_there() {
+    let config = board(&FLOAT, Bandwidth::Unlimited);
+    let mut machine = Machine::new(config);
+    let before = machine.host.board.counts();
+    machine.host.board.record();
+    machine.step(&small()).expect("no fault");
+    let after = machine.host.board.counts();
+    let last = machine.host.board.register_accesses();
+    let recording = machine.host.board.take_recording().expect("it was recorded");
+    assert_eq!(recording.span, Span { begin: before.cycles, end: after.cycles });
+    let [reads, writes] = [false, true].map(|write| {
+        recording.accesses.iter().filter(|access| access.write == write).count() as u64
+    });
+    assert_eq!(reads, after.register_reads - before.register_reads);
+    assert_eq!(writes, after.register_writes - before.register_writes);
+    assert_eq!(recording.doorbells.len() as u64, after.doorbells - before.doorbells);
+    assert!(recording.accesses.ends_with(&last[last.len() - 20..]));
+    assert!(!recording.interrupt.first);
+    let rise = recording.interrupt.edges[0];
+    let sends = recording.stages.last().expect("the integration");
+    assert_eq!(sends.stage, Stage::Integrate);
+    let results = recording.channels.iter().filter(|one| one.direction == Direction::S2mm);
+    let end = results.flat_map(|one| &one.packets).map(|packet| packet.span.end).max();
+    assert!(end.is_some_and(|end| end <= rise), "{end:?} {rise}");
+    let results = recording.channels.iter().filter(|one| one.direction == Direction::S2mm);
+    let begin = results.flat_map(|one| &one.packets).map(|packet| packet.span.begin).min();
+    assert!(begin.is_some_and(|begin| sends.span.begin <= begin), "{begin:?} {sends:?}");
+    assert_eq!(recording.interrupt.edges.len().div_ceil(2) as u64, after.interrupts);
+}
+
+#[test]
+fn a_stream_without_room_shows_a_sender_that_waits() {
+    let Taken { recording, .. } = recorded(board(&FLOAT, Bandwidth::Unlimited), &small());
+    let channels = recording.expect("it was recorded").channels;
+    let waits = |port: &Port| *port == Port::Rests { valid: true, ready: false };
+    // Collisions with hazards take longer than their beats.
+    assert!(channels[0].port.iter().any(|state| waits(&state.port)));
+}
+
+#[test]
+fn a_step_that_fails_is_recorded_to_its_end() {
+    let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
+    let mut machine = Machine::new(config);
+    let fault = Fault::new(FaultKind::DmaDecErr).on(2, Direction::Mm2s);
+    machine.host.board.inject(fault.in_phase(StepPhase::Contact(2)).when(When::Beat(17)));
+    machine.host.board.record();
+    machine.step(&small()).expect_err("the fault");
+    let recording = machine.host.board.take_recording().expect("it was recorded");
+    let faulty = &recording.channels[2];
+    assert_eq!((faulty.core, faulty.packets.len()), (2, 2), "velocities and one pass");
+    let stages: Vec<_> = recording.stages.iter().map(|stage| stage.stage).collect();
+    assert_eq!(stages, [Stage::Load, Stage::Contact(1)]);
+}

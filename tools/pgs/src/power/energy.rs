@@ -1,0 +1,168 @@
+//! The energy of a step from the samples of the idle and the busy board.
+
+use std::time::Duration;
+
+use bitstream_model::estimate::thesis::recorded::ZCU102_WATTS;
+use serde_json::{Value, json};
+
+use super::sensors::{Domain, GAIN_ERROR, Sensors, Watts};
+
+/// The mean of samples, and the standard error of the mean, W.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mean {
+    watts: Watts,
+    error: Watts,
+    samples: usize,
+}
+
+impl Mean {
+    /// `None` for less than two samples.
+    pub(super) fn of(samples: &[Watts]) -> Option<Self> {
+        if samples.len() < 2 {
+            return None;
+        }
+        let both = |domain| {
+            let count = samples.len() as f64;
+            let mean = samples.iter().map(|watts| watts.of(domain)).sum::<f64>() / count;
+            let squares =
+                samples.iter().map(|watts| (watts.of(domain) - mean).powi(2)).sum::<f64>();
+            (mean, (squares / (count - 1.0) / count).sqrt())
+        };
+        let ((logic, logic_error), (processor, processor_error)) =
+            (both(Domain::Logic), both(Domain::Processor));
+        Some(Self {
+            watts: Watts { logic, processor },
+            error: Watts { logic: logic_error, processor: processor_error },
+            samples: samples.len(),
+        })
+    }
+}
+
+/// A number with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Uncertain {
+    pub(crate) value: f64,
+    /// Two standard errors of the samples, and the gain error of the sensors.
+    pub(crate) within: f64,
+}
+
+/// The measured energy of a step.
+#[derive(Debug, Clone)]
+pub(crate) struct Energy {
+    rails: [Vec<&'static str>; 2],
+    idle: Mean,
+    busy: Mean,
+    /// Time of a step, with the work of the processor between two steps, s.
+    seconds: f64,
+}
+
+impl Energy {
+    pub(super) fn new(
+        sensors: &Sensors,
+        idle: Mean,
+        busy: Mean,
+        elapsed: Duration,
+        steps: u32,
+    ) -> Self {
+        let rails = Domain::ALL.map(|domain| sensors.rails(domain));
+        Self { rails, idle, busy, seconds: elapsed.as_secs_f64() / f64::from(steps) }
+    }
+
+    /// Energy of a step above idle, J.
+    pub(crate) fn joules(&self, domain: Domain) -> Uncertain {
+        let (idle, busy) = (self.idle.watts.of(domain), self.busy.watts.of(domain));
+        let random = self.idle.error.of(domain).hypot(self.busy.error.of(domain));
+        let above = busy - idle;
+        let within = (2.0 * random).hypot(GAIN_ERROR * above);
+        Uncertain { value: above * self.seconds, within: within * self.seconds }
+    }
+
+    /// For people.
+    pub(crate) fn text(&self) -> String {
+        let parts = Domain::ALL.iter().zip(&self.rails).filter(|(_, rails)| !rails.is_empty());
+        let parts: Vec<String> = parts
+            .map(|(domain, rails)| {
+                let joules = self.joules(*domain);
+                format!(
+                    "{:.4} ± {:.4} J a step above idle in the {} ({}; idle {:.3} W, busy {:.3} W)",
+                    joules.value,
+                    joules.within,
+                    domain.name(),
+                    rails.join(", "),
+                    self.idle.watts.of(*domain),
+                    self.busy.watts.of(*domain),
+                )
+            })
+            .collect();
+        format!(
+            "measured: {}; {} samples idle and {} busy; ± two standard errors and the sensors' gain, \
+             without the tolerance of the shunts",
+            parts.join("; "),
+            self.idle.samples,
+            self.busy.samples
+        )
+    }
+
+    /// For programs.
+    pub(crate) fn to_json(&self) -> Value {
+        let mut document = json!({
+            "origin": "measured",
+            "seconds_a_step": self.seconds,
+            "samples_idle": self.idle.samples,
+            "samples_busy": self.busy.samples,
+        });
+        for (domain, rails) in Domain::ALL.into_iter().zip(&self.rails) {
+            let joules = self.joules(domain);
+            document[domain.key()] = json!({
+                "rails": rails,
+                "idle_w": self.idle.watts.of(domain),
+                "busy_w": self.busy.watts.of(domain),
+                "joules_a_step": joules.value,
+                "joules_within": joules.within,
+            });
+        }
+        document
+    }
+}
+
+/// The energy of a step of so many milliseconds at the thesis' power, for boards without sensors.
+pub(crate) fn at_thesis_power(ms: f64) -> (String, Value) {
+    let joules = ZCU102_WATTS * ms / 1e3;
+    let text = format!(
+        "{joules:.3} J a step at {ZCU102_WATTS} W, the power that the thesis takes for the board: not \
+         measured"
+    );
+    (text, json!({ "origin": "recorded", "watts": ZCU102_WATTS, "joules_a_step": joules }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sensors::tests::monitors;
+    use super::*;
+
+    #[test]
+    fn a_step_has_its_share_of_the_power_above_idle() {
+        let folder = monitors(&[("name", "ina226_u79", "1"), ("name", "ina226_u76", "1")]);
+        let sensors = Sensors::find(folder.path()).expect("sensors");
+        let samples = |logic: [f64; 2]| logic.map(|logic| Watts { logic, processor: 1.0 });
+        let idle = Mean::of(&samples([1.9, 2.1])).expect("samples");
+        let busy = Mean::of(&samples([5.0, 5.0])).expect("samples");
+        let energy = Energy::new(&sensors, idle, busy, Duration::from_secs(2), 100);
+        let joules = energy.joules(Domain::Logic);
+        assert!((joules.value - 3.0 * 0.02).abs() < 1e-12);
+        // The standard error of 1.9 and 2.1 is 0.1 W; the gain error is 0.006 W.
+        assert!((joules.within - 0.2_f64.hypot(0.006) * 0.02).abs() < 1e-12);
+        assert!(energy.joules(Domain::Processor).value.abs() < 1e-12);
+        assert!(Mean::of(&samples([1.0, 1.0])[..1]).is_none());
+    }
+
+    #[test]
+    fn without_sensors_the_power_is_called_the_thesis() {
+        let (text, document) = at_thesis_power(7.49);
+        assert!(
+            text.starts_with("0.112 J a step at 15 W") && text.ends_with("not measured"),
+            "{text}"
+        );
+        assert_eq!(document["origin"], "recorded");
+    }
+}

@@ -1,0 +1,117 @@
+//! Samples the sensors in a thread of its own.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::energy::{Energy, Mean};
+use super::sensors::{SensorError, Sensors, Watts};
+
+/// Samples of the idle board before the first step.
+const IDLE_SAMPLES: u32 = 30;
+
+/// A meter that samples until it is asked for the energy.
+#[derive(Debug)]
+pub(crate) struct PowerMeter {
+    sensors: Sensors,
+    idle: Vec<Watts>,
+    started: Instant,
+    /// Dropping it ends the thread.
+    stop: Sender<()>,
+    thread: JoinHandle<Result<Vec<Watts>, SensorError>>,
+}
+
+impl PowerMeter {
+    /// Samples the idle board, then begins to sample the steps.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a sensor cannot be read.
+    pub(crate) fn start(sensors: Sensors) -> Result<Self, SensorError> {
+        let (_running, idle) = channel();
+        let idle = sample(&sensors, &idle, IDLE_SAMPLES)?;
+        let (stop, stopped) = channel();
+        let own = sensors.clone();
+        let thread = std::thread::spawn(move || sample(&own, &stopped, u32::MAX));
+        Ok(Self { sensors, idle, started: Instant::now(), stop, thread })
+    }
+
+    /// Ends the sampling; the energy of each of `steps` steps. `None` for no step, or if the steps took
+    /// less time than a sensor needs for a value.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a sensor could not be read during the steps.
+    pub(crate) fn stop(self, steps: u32) -> Result<Option<Energy>, SensorError> {
+        let Self { sensors, idle, started, stop, thread } = self;
+        let elapsed = started.elapsed();
+        drop(stop);
+        let Ok(samples) = thread.join() else { return Ok(None) };
+        let samples = samples?;
+        // The first value may be of the time before the steps.
+        let Some((_, samples)) = samples.split_first() else { return Ok(None) };
+        let means = (Mean::of(&idle), Mean::of(samples));
+        let (Some(idle), Some(busy)) = means else { return Ok(None) };
+        Ok((steps > 0).then(|| Energy::new(&sensors, idle, busy, elapsed, steps)))
+    }
+}
+
+/// Reads the sensors once an interval, at most `count` times, until the sender of `stopped` is gone.
+fn sample(
+    sensors: &Sensors,
+    stopped: &Receiver<()>,
+    count: u32,
+) -> Result<Vec<Watts>, SensorError> {
+    let mut samples = Vec::new();
+    let mut due = Instant::now();
+    for _ in 0..count {
+        samples.push(sensors.read()?);
+        due += sensors.interval();
+        let left = due.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+        if stopped.recv_timeout(left) != Err(RecvTimeoutError::Timeout) {
+            break;
+        }
+    }
+    Ok(samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sensors::tests::monitors;
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn the_idle_boards_power_is_subtracted() {
+        let folder = monitors(&[("name", "ina226_u79", "2000000")]);
+        let file = folder.path().join("hwmon0/power1_input");
+        fs::write(folder.path().join("hwmon0/update_interval"), "10\n").expect("written");
+        let sensors = Sensors::find(folder.path()).expect("a sensor");
+        let meter = PowerMeter::start(sensors.clone()).expect("idle power");
+        // Replaced as a whole: the meter never reads half a number.
+        let next = folder.path().join("next");
+        fs::write(&next, "5000000\n").expect("written");
+        fs::rename(&next, &file).expect("replaced");
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_millis(200) {
+            std::thread::park_timeout(Duration::from_millis(20));
+        }
+        let energy = meter.stop(10).expect("power").expect("samples");
+        let text = energy.text();
+        // 3 W above idle over at least 0.2 s in 10 steps.
+        assert!(energy.joules(super::super::sensors::Domain::Logic).value >= 0.05, "{text}");
+        assert!(text.contains("VCCINT") && text.contains("idle 2.000 W"), "{text}");
+    }
+
+    #[test]
+    fn a_sensor_that_fails_during_the_steps_is_told() {
+        let folder = monitors(&[("name", "ina226_u79", "2000000")]);
+        fs::write(folder.path().join("hwmon0/update_interval"), "10\n").expect("written");
+        let sensors = Sensors::find(folder.path()).expect("a sensor");
+        let meter = PowerMeter::start(sensors).expect("idle power");
+        fs::remove_file(folder.path().join("hwmon0/power1_input")).expect("there");
+        // The thread ends by itself at the first sample that fails.
+        while !meter.thread.is_finished() {
+            std::thread::yield_now();
+        }
+        assert!(meter.stop(1).is_err());
+    }
+}

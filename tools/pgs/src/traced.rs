@@ -1,0 +1,124 @@
+//! Records a step on the emulated board, and writes its course to files.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use bitstream_model::EmulatedBoard;
+use bitstream_model::recording::Recording;
+use clap::Args;
+use serde_json::{Value, json};
+use step_folder::replace::Replacement;
+use step_trace::TracedStep;
+use zynq_pgs::{BoardKind, StepReport};
+
+use crate::board::OpenBoard;
+use crate::failure::Failure;
+use crate::options::build::described;
+
+/// The files that show the inside of a step.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Inside a step (emulated board)")]
+pub(crate) struct TracedArgs {
+    /// Write streams, registers, stages and the interrupt of the step to FILE, for GTKWave
+    #[arg(long, value_name = "FILE")]
+    vcd: Option<PathBuf>,
+    /// Write the course of the step to FILE as JSON, for Perfetto (<https://ui.perfetto.dev>)
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Draw the step to FILE (SVG): CPU, channels and accelerator over time
+    #[arg(long, value_name = "FILE")]
+    timeline: Option<PathBuf>,
+}
+
+/// A board to record a step of.
+#[derive(Debug)]
+pub(crate) struct Tracing<'a> {
+    args: &'a TracedArgs,
+    board: EmulatedBoard,
+}
+
+impl TracedArgs {
+    /// The options that the command line has, with their files.
+    fn given(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
+        let all = [("vcd", &self.vcd), ("trace", &self.trace), ("timeline", &self.timeline)];
+        all.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?)))
+    }
+
+    /// Whether a step is to be recorded.
+    pub(crate) fn is_given(&self) -> bool {
+        self.given().next().is_some()
+    }
+
+    /// The board to record, if a step is to be recorded. A board outside this process has no recorder.
+    pub(crate) fn tracing(&self, opened: &OpenBoard) -> Result<Option<Tracing<'_>>, Failure> {
+        let Some((name, _)) = self.given().next() else { return Ok(None) };
+        if let Some(board) = &opened.observer {
+            return Ok(Some(Tracing { args: self, board: board.clone() }));
+        }
+        let (kind, next) = match opened.accelerator.board().kind {
+            BoardKind::Served => (
+                "served by another process",
+                format!("leave out --{name}, or leave out --board socket:PATH"),
+            ),
+            _ => ("real", format!("leave out --{name}, or add --board emulated")),
+        };
+        let error = format!(
+            "--{name} shows the inside of an emulated board of this process, and this board is {kind}"
+        );
+        let accesses = "RUST_LOG=trace shows its register accesses";
+        Err(Failure::input(error).next(format!("{next}; {accesses}")))
+    }
+
+    /// The files, for people.
+    pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.given().try_for_each(|(name, path)| writeln!(out, "{name:<10} {}", path.display()))
+    }
+
+    /// The same for programs; null without any.
+    pub(crate) fn to_json(&self) -> Value {
+        match self.is_given() {
+            true => json!({
+                "vcd": self.vcd.as_ref().map(|path| path.display().to_string()),
+                "trace": self.trace.as_ref().map(|path| path.display().to_string()),
+                "timeline": self.timeline.as_ref().map(|path| path.display().to_string()),
+            }),
+            false => Value::Null,
+        }
+    }
+}
+
+impl Tracing<'_> {
+    /// Records from now on.
+    pub(crate) fn begin(&self) {
+        self.board.record();
+    }
+
+    /// Ends the recording and writes the files; all of them, or none. A step that failed has no
+    /// report.
+    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<(), Failure> {
+        match self.board.take_recording() {
+            Some(recording) => self.write(&recording, report),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&self, recording: &Recording, report: Option<&StepReport>) -> Result<(), Failure> {
+        let design = described(&self.board.config());
+        let step = TracedStep { recording, design: &design, report };
+        let mut files = Replacement::default();
+        let written = self.args.given().try_for_each(|(name, path)| {
+            files.stage(path, |file| {
+                let mut out = io::BufWriter::new(file);
+                match name {
+                    "vcd" => step.write_vcd(&mut out)?,
+                    "trace" => step.write_events(&mut out)?,
+                    _ => step.write_timeline(&mut out)?,
+                }
+                out.flush()
+            })
+        });
+        written.and_then(|()| files.commit()).map_err(|error| {
+            Failure::input(error).next("make room, or name another file; no file has changed")
+        })
+    }
+}

@@ -1,0 +1,110 @@
+//! Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
+
+use bitstream_model::Bandwidth;
+use bitstream_model::estimate::thesis::recorded::{CPU, Design, GPU, Platform, ZCU102_WATTS};
+use bitstream_model::estimate::thesis::{BODIES, COLLISIONS};
+use bitstream_model::estimate::{Records, StepShape, StepTime};
+use bitstream_model::interface::profile::PROFILES;
+
+use super::super::chart::bars;
+use super::super::document::{Figure, Origin, Part};
+use crate::failure::Failure;
+
+/// A design's figure over a machine: the thesis', if it has one, and ours.
+type Beside = (Option<f64>, f64);
+
+/// The speed-up of a profile over a machine.
+fn beside(
+    platform: &Platform,
+    recorded: impl Fn(&Design) -> f64,
+    ours: impl Fn(&Platform, f64) -> f64,
+) -> Vec<(String, Beside)> {
+    let shape = StepShape::new(BODIES, COLLISIONS);
+    PROFILES
+        .iter()
+        .map(|profile| {
+            let variant = profile.default_variant();
+            let time = StepTime::new(&variant, Records::Packed, &shape, Bandwidth::Unlimited);
+            let printed = Design::of(profile).map(&recorded);
+            (profile.name.to_owned(), (printed, ours(platform, time.seconds * 1e3)))
+        })
+        .collect()
+}
+
+fn speedup(platform: &Platform, ms: f64) -> f64 {
+    platform.latency_ms / ms
+}
+
+fn efficiency(platform: &Platform, ms: f64) -> f64 {
+    platform.watts * platform.latency_ms / (ZCU102_WATTS * ms)
+}
+
+fn figure(
+    id: &'static str,
+    thesis: &'static str,
+    title: &str,
+    over: [&[(String, Beside)]; 2],
+    caption: &str,
+) -> Result<Figure, Failure> {
+    let groups: Vec<String> = over[0].iter().map(|(name, _)| name.clone()).collect();
+    let names = ["GPU, recorded", "GPU, modelled", "CPU, recorded", "CPU, modelled"];
+    let values = over[0]
+        .iter()
+        .zip(over[1])
+        .map(|((_, gpu), (_, cpu))| vec![gpu.0, Some(gpu.1), cpu.0, Some(cpu.1)]);
+    let values: Vec<_> = values.collect();
+    Ok(Figure {
+        id,
+        thesis,
+        title: title.to_owned(),
+        svg: bars("times", &groups, &names.map(str::to_owned), &values)?,
+        caption: caption.to_owned(),
+        origin: Origin::Modelled,
+    })
+}
+
+pub(crate) fn part() -> Result<Part, Failure> {
+    let speed = [
+        beside(&GPU, |design| design.speedup.gpu, speedup),
+        beside(&CPU, |design| design.speedup.cpu, speedup),
+    ];
+    let energy = [
+        beside(&GPU, |design| design.energy.gpu, efficiency),
+        beside(&CPU, |design| design.energy.cpu, efficiency),
+    ];
+    let figures = vec![
+        figure(
+            "figure-6-1",
+            "Figure 6.1",
+            "Speed-up of each design over GPU and CPU",
+            [&speed[0], &speed[1]],
+            "Times of GTX 980 and i7-3770 are the thesis' records; the accelerator's are our model's, on \
+             the thesis' step. The thesis prints no figures of its first design (naive); mixed, windowed \
+             and windowed16 are this project's own.",
+        )?,
+        figure(
+            "figure-6-2",
+            "Figure 6.2",
+            "Energy efficiency of each design over GPU and CPU",
+            [&energy[0], &energy[1]],
+            "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured.",
+        )?,
+    ];
+    Ok(Part { figures, rows: Vec::new() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_models_figures_are_near_the_recorded_ones() {
+        for (platform, of) in [(&GPU, 0), (&CPU, 1)] {
+            let recorded = move |design: &Design| [design.speedup.gpu, design.speedup.cpu][of];
+            for (name, (printed, ours)) in beside(platform, recorded, speedup) {
+                let near = printed.is_none_or(|printed| (ours / printed - 1.0).abs() < 0.02);
+                assert!(near, "{name}: {printed:?} and {ours}");
+            }
+        }
+    }
+}

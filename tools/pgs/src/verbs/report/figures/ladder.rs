@@ -1,0 +1,36 @@
+//! Chapter 5: the designs from single words to half precision, and the factor of each.
+
+use super::super::chart::bars;
+use super::super::document::{Figure, Origin, Part, Row};
+use crate::failure::Failure;
+use crate::numbers::grouped;
+use crate::verbs::study::ladder::{Options, Rung, measure};
+
+const COMMAND: &str = "pgs study ladder";
+
+pub(crate) fn part() -> Result<Part, Failure> {
+    let outcome = measure(&Options::default());
+    let names: Vec<String> = outcome.rungs.iter().map(|rung| rung.design.to_owned()).collect();
+    let factors: Vec<Vec<Option<f64>>> =
+        outcome.rungs.iter().map(|rung| vec![rung.factor]).collect();
+    let figure = Figure {
+        id: "figure-ladder",
+        thesis: "Chapter 5",
+        title: "How many times as fast each design is as the one before it".to_owned(),
+        svg: bars("times", &names, &["over the design before".to_owned()], &factors)?,
+        caption: "From words that the processor writes one by one to half precision, on the thesis' step."
+            .to_owned(),
+        origin: Origin::Modelled,
+    };
+    let row = |rung: &Rung| Row {
+        thesis: rung.thesis.to_owned(),
+        subject: format!("cycles of a step: {}", rung.design),
+        recorded: rung.recorded_cycles.map_or("not given".to_owned(), grouped),
+        ours: format!("{} ({:.2} ms)", grouped(rung.cycles), rung.milliseconds),
+        origin: Origin::Modelled,
+        command: COMMAND.to_owned(),
+        shown: figure.id.to_owned(),
+    };
+    let rows = outcome.rungs.iter().map(row).collect();
+    Ok(Part { figures: vec![figure], rows })
+}

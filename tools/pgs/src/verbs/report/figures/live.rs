@@ -1,0 +1,102 @@
+//! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
+
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve};
+
+use super::super::chart::{Axis, Drawn, Series, lines};
+use super::super::document::{Figure, Origin, Part, Row};
+use super::super::step::Step;
+use crate::failure::Failure;
+use crate::numbers::grouped;
+
+/// Bodies that the thesis' order keeps alive at most.
+const RECORDED: u32 = 1528;
+/// Ranges of slots of which a curve shows the maximum.
+const RANGES: usize = 400;
+/// Depth of the float profile's pipeline, issue slots.
+const DEPTH: u32 = 64;
+
+/// The largest number of each range of slots.
+fn thinned(alive: &[u32]) -> Vec<(f64, f64)> {
+    let each = alive.len().div_ceil(RANGES).max(1);
+    let mut from = 0.0;
+    let mut points = Vec::new();
+    for range in alive.chunks(each) {
+        points.push((from, f64::from(range.iter().copied().max().unwrap_or(0))));
+        from += f64::from(u32::try_from(range.len()).unwrap_or(u32::MAX));
+    }
+    points
+}
+
+pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
+    let mut buffers = InputBuffers::new();
+    buffers.gather(&step.bodies, &step.collisions, &step.shapes);
+    let input = buffers.input();
+    let refused = |error: OrderError| Failure::input(error);
+    let window = IssueWindow::new(DEPTH, 1).map_err(refused)?;
+    let mut orderer = Orderer::new();
+    let mut series = Vec::new();
+    let mut most = Vec::new();
+    for (name, order) in [
+        ("as given", Order::AsGiven),
+        ("Algorithm 3, ties by the lowest index", Order::BodyByBody(Ties::LowestIndex)),
+        ("Algorithm 3, ties by the oldest", Order::BodyByBody(Ties::Oldest)),
+        ("Algorithm 3, ties by the newest", Order::BodyByBody(Ties::Newest)),
+        ("hazard-free (ours)", Order::HazardFree),
+    ] {
+        orderer.order(&input, order, window).map_err(refused)?;
+        let alive = live_curve(orderer.schedule(), &input, window).map_err(refused)?;
+        most.push((name, alive.iter().copied().max().unwrap_or(0)));
+        series.push(Series::new(name, Drawn::Line, thinned(&alive)));
+    }
+    let end =
+        series.iter().flat_map(|series| series.points.last()).map(|at| at.0).fold(1.0, f64::max);
+    let recorded = f64::from(RECORDED);
+    series.push(Series::new(
+        "1,528, the thesis' largest",
+        Drawn::Dashes,
+        vec![(0.0, recorded), (end, recorded)],
+    ));
+    let figure = Figure {
+        id: "figure-4-13",
+        thesis: "Figure 4.13",
+        title: "Bodies to keep on chip along the sorted collisions".to_owned(),
+        svg: lines(Axis::linear("issue slot"), Axis::log("bodies alive"), &series)?,
+        caption: format!(
+            "A body is alive from its first collision to its last. The step is {}; the thesis' own is not \
+             published, and its Algorithm 3 does not say how ties are broken.",
+            step.name
+        ),
+        origin: Origin::Measured,
+    };
+    let ours: Vec<String> = most
+        .iter()
+        .skip(1)
+        .map(|(name, most)| {
+            format!("{} ({})", grouped(u64::from(*most)), name.replace("Algorithm 3, ", ""))
+        })
+        .collect();
+    let moving = input.moving.iter().filter(|moving| **moving).count();
+    let row = Row {
+        thesis: "§4.7, Figure 4.13, Algorithm 3".to_owned(),
+        subject: format!("most bodies alive of {}", grouped(moving as u64)),
+        recorded: "1,528 of 38,880 (3.85 %; 1,528 / 38,880 is 3.93 %)".to_owned(),
+        ours: ours.join("; "),
+        origin: Origin::Measured,
+        command: step.command("pgs order", "--drop 1 --steps"),
+        shown: figure.id.to_owned(),
+    };
+    Ok(Part { figures: vec![figure], rows: vec![row] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_the_largest_of_each_range() {
+        let alive: Vec<u32> = (0..1000).map(|k| if k == 501 { 77 } else { 1 }).collect();
+        let points = thinned(&alive);
+        assert_eq!(points.len(), 334);
+        assert_eq!(points.iter().filter(|point| point.1 > 1.0).count(), 1);
+    }
+}

@@ -1,0 +1,146 @@
+//! The report as one page of HTML, without anything to load.
+
+use std::fmt::Write as _;
+
+use super::document::{Figure, Origin, Row};
+use super::parts::Report;
+use super::tables::anchor;
+use super::text::preface;
+use crate::verbs::model::render::{at_right, shown};
+use crate::verbs::model::table::Table;
+
+const STYLE: &str = include_str!("page.css");
+
+/// Text as HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+pub(super) fn html(report: &Report) -> String {
+    let mut text = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>zynq-pgs: the thesis' figures from our own numbers</title>\n\
+         <style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n\
+         <h1>The thesis' figures, from our own numbers</h1>\n<p>{}</p>\n<ul class=\"legend\">\n",
+        escaped(&preface(report))
+    );
+    for origin in Origin::ALL {
+        let _ = writeln!(text, "<li>{} {}</li>", tag(origin), escaped(origin.meaning()));
+    }
+    text.push_str(
+        "</ul>\n<nav><a href=\"#index\">Index</a> <a href=\"#figures\">Figures</a> \
+         <a href=\"#tables\">Tables</a></nav>\n</header>\n<main>\n",
+    );
+    index(&mut text, &report.part.rows);
+    text.push_str("<section id=\"figures\">\n<h2>Figures</h2>\n");
+    for figure in &report.part.figures {
+        self::figure(&mut text, figure);
+    }
+    text.push_str("</section>\n<section id=\"tables\">\n<h2>Tables</h2>\n");
+    for table in &report.tables {
+        self::table(&mut text, table);
+    }
+    text.push_str("</section>\n</main>\n</body>\n</html>\n");
+    text
+}
+
+/// The mark and the word of an origin.
+fn tag(origin: Origin) -> String {
+    let word = origin.word();
+    format!("<span class=\"origin {word}\">{} {word}</span>", origin.mark())
+}
+
+fn index(text: &mut String, rows: &[Row]) {
+    text.push_str(
+        "<section id=\"index\">\n<h2>Index</h2>\n<div class=\"wide\"><table class=\"index\">\n\
+         <thead><tr><th>Thesis</th><th>Subject</th><th>Its figure</th><th>Ours</th><th></th>\
+         <th>Command</th></tr></thead>\n<tbody>\n",
+    );
+    for row in rows {
+        let _ = writeln!(
+            text,
+            "<tr><td>{}</td><td><a href=\"#{}\">{}</a></td><td>{}</td><td>{}</td><td>{}</td>\
+             <td><code>{}</code></td></tr>",
+            escaped(&row.thesis),
+            escaped(&row.shown),
+            escaped(&row.subject),
+            escaped(&row.recorded),
+            escaped(&row.ours),
+            tag(row.origin),
+            escaped(&row.command)
+        );
+    }
+    text.push_str("</tbody>\n</table></div>\n</section>\n");
+}
+
+fn figure(text: &mut String, figure: &Figure) {
+    let title = format!("{}: {}", figure.thesis, figure.title);
+    let _ = writeln!(
+        text,
+        "<figure id=\"{}\">\n<h3>{}</h3>\n{}<figcaption>{} {}</figcaption>\n</figure>",
+        figure.id,
+        escaped(&title),
+        named(&figure.svg, &title),
+        tag(figure.origin),
+        escaped(&figure.caption)
+    );
+}
+
+/// The picture with a name for people who cannot see it.
+fn named(svg: &str, title: &str) -> String {
+    let start = svg.find("<svg").unwrap_or(0);
+    let label = format!("<svg role=\"img\" aria-label=\"{}\"", escaped(title));
+    svg[start..].replacen("<svg", &label, 1)
+}
+
+fn table(text: &mut String, table: &Table) {
+    let _ = writeln!(
+        text,
+        "<section class=\"table\" id=\"{}\">\n<h3>{}</h3>\n<div class=\"wide\"><table>\n<thead><tr>",
+        anchor(table),
+        escaped(&table.title)
+    );
+    let class = |column| if at_right(table, column) { " class=\"number\"" } else { "" };
+    for (place, column) in table.columns.iter().enumerate() {
+        let _ = write!(text, "<th{}>{}</th>", class(place), escaped(column.head));
+    }
+    text.push_str("</tr></thead>\n<tbody>\n");
+    for row in &table.rows {
+        text.push_str("<tr>");
+        for (place, cell) in row.iter().enumerate() {
+            let _ = write!(text, "<td{}>{}</td>", class(place), escaped(&shown(cell)));
+        }
+        text.push_str("</tr>\n");
+    }
+    text.push_str("</tbody>\n</table></div>\n");
+    if !table.notes.is_empty() {
+        text.push_str("<ul>\n");
+        for note in &table.notes {
+            let _ = writeln!(text, "<li>{}</li>", escaped(note));
+        }
+        text.push_str("</ul>\n");
+    }
+    text.push_str("</section>\n");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_become_markup() {
+        assert_eq!(escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
+    }
+
+    #[test]
+    fn a_picture_has_a_name() {
+        let text = named("<?xml?>\n<svg viewBox=\"0 0 1 1\"></svg>", "Figure 1: a < b");
+        assert_eq!(
+            text,
+            "<svg role=\"img\" aria-label=\"Figure 1: a &lt; b\" viewBox=\"0 0 1 1\"></svg>"
+        );
+    }
+}

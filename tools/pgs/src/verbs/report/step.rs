@@ -1,0 +1,79 @@
+//! The step that the report measures: a folder's, or a step of our own pile.
+
+use std::path::Path;
+
+use scene::{Scene, SceneOptions};
+use zynq_pgs::{Body, Collision, Shape, StepParameters};
+
+use super::ReportArgs;
+use crate::board;
+use crate::common::CommonArgs;
+use crate::failure::Failure;
+use crate::step_input;
+use step_folder::folder::Folder;
+use zynq_pgs::emulation::Build;
+
+/// The input of a step.
+#[derive(Debug)]
+pub(super) struct Step {
+    /// The step for people: "the step in vectors/full_step186".
+    pub(super) name: String,
+    /// Options of other verbs that take the same step.
+    options: Options,
+    pub(super) bodies: Vec<Body>,
+    pub(super) shapes: Vec<Shape>,
+    pub(super) collisions: Vec<Collision>,
+}
+
+#[derive(Debug)]
+enum Options {
+    Folder(String),
+    Pile { grid: String, steps: u32 },
+}
+
+impl Step {
+    pub(super) fn folder(path: &Path) -> Result<Self, Failure> {
+        let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
+        let shown = path.display().to_string();
+        let name = format!("the step in {shown}");
+        Ok(Self { name, options: Options::Folder(shown), bodies, shapes, collisions })
+    }
+
+    /// A step of our own pile, after the steps before it on the emulated board; calls `taken` after
+    /// each of them.
+    pub(super) fn of_pile(
+        args: &ReportArgs,
+        common: &CommonArgs,
+        mut taken: impl FnMut(),
+    ) -> Result<Self, Failure> {
+        let options = SceneOptions { grid: args.grid, ..SceneOptions::default() };
+        let mut scene = Scene::new(&options).map_err(Failure::input)?;
+        let mut opened = board::open(common, &Build::default())?;
+        opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+        let parameters = StepParameters::default();
+        for _ in 1..args.step {
+            scene.detect();
+            let (bodies, collisions) = scene.parts_mut();
+            let stepped = opened.accelerator.step(bodies, collisions, &parameters);
+            stepped.map_err(|error| opened.failure(error))?;
+            taken();
+        }
+        scene.detect();
+        Ok(Self {
+            name: format!("step {} of our pile of {} cubes", args.step, args.grid),
+            options: Options::Pile { grid: args.grid.to_string(), steps: args.step },
+            bodies: scene.bodies().to_vec(),
+            shapes: scene.shapes().to_vec(),
+            collisions: scene.collisions().to_vec(),
+        })
+    }
+
+    /// The command that measures this step with another verb, whose option for the number of a step
+    /// is `step`.
+    pub(super) fn command(&self, verb: &str, step: &str) -> String {
+        match &self.options {
+            Options::Folder(path) => format!("{verb} --input {path}"),
+            Options::Pile { grid, steps } => format!("{verb} --grid {grid} {step} {steps}"),
+        }
+    }
+}

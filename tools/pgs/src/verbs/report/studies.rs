@@ -1,0 +1,202 @@
+//! The studies behind the report's figures, with the commands that repeat them.
+
+use clap::{Args, Command};
+
+use super::ReportArgs;
+use crate::failure::{Cause, Failure};
+use crate::histogram::Histogram;
+use crate::verbs::study::{Session, determinism, half, split, stopping, time_step};
+
+/// The outcome of a study.
+#[derive(Debug)]
+pub(super) struct Studied<T> {
+    /// The command that repeats it.
+    pub(super) command: String,
+    /// The steps that were taken, for people.
+    pub(super) subject: String,
+    pub(super) outcome: T,
+}
+
+/// How much the report measures.
+#[derive(Debug)]
+pub(super) struct Effort<'a> {
+    args: &'a ReportArgs,
+    session: &'a Session,
+}
+
+/// Parses the options of a study, and the command that has them.
+fn options<T: Args>(study: &str, words: &[String]) -> Result<(String, T), Failure> {
+    let name = "study".to_owned();
+    let matches = T::augment_args(Command::new("study"))
+        .try_get_matches_from(std::iter::once(&name).chain(words))
+        .and_then(|matches| T::from_arg_matches(&matches));
+    let command = format!("pgs study {study} {}", words.join(" "));
+    let options = matches
+        .map_err(|error| Failure::new(Cause::Input, format!("{command} is refused: {error}")))?;
+    Ok((command, options))
+}
+
+fn words(text: &str) -> Vec<String> {
+    text.split_whitespace().map(str::to_owned).collect()
+}
+
+impl<'a> Effort<'a> {
+    pub(super) fn new(args: &'a ReportArgs, session: &'a Session) -> Self {
+        Self { args, session }
+    }
+
+    /// The step of the report: the folder's, or one of our own pile.
+    fn one_step(&self) -> (Vec<String>, String) {
+        let ReportArgs { input, grid, step, .. } = self.args;
+        match input {
+            Some(path) => {
+                let path = path.display().to_string();
+                let subject = format!("the step in {path}");
+                (vec!["--input".to_owned(), path], subject)
+            }
+            None => {
+                let from = step.saturating_sub(1);
+                let words = words(&format!("--grid {grid} --from {from} --steps 1"));
+                (words, format!("step {step} of our pile of {grid} cubes"))
+            }
+        }
+    }
+
+    /// Many steps of our own pile: a small one in a quick report.
+    fn many_steps(&self) -> (Vec<String>, String) {
+        let (grid, steps) = match self.args.quick {
+            true => ("12x12x12".to_owned(), 150),
+            false => (self.args.grid.to_string(), 150),
+        };
+        (
+            words(&format!("--grid {grid} --steps {steps}")),
+            format!("{steps} steps of our pile of {grid} cubes"),
+        )
+    }
+
+    fn orders(
+        &self,
+        (mut words, subject): (Vec<String>, String),
+        pairs: u32,
+    ) -> Result<Studied<determinism::Outcome>, Failure> {
+        words.extend(["--pairs".to_owned(), pairs.to_string()]);
+        let (command, options) = options::<determinism::Options>("determinism", &words)?;
+        let outcome = determinism::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn orders_of_one_step(&self) -> Result<Studied<determinism::Outcome>, Failure> {
+        self.orders(self.one_step(), if self.args.quick { 5 } else { 20 })
+    }
+
+    pub(super) fn orders_of_many_steps(&self) -> Result<Studied<determinism::Outcome>, Failure> {
+        self.orders(self.many_steps(), 2)
+    }
+
+    fn half(
+        &self,
+        (words, subject): (Vec<String>, String),
+    ) -> Result<Studied<half::Outcome>, Failure> {
+        let (command, options) = options::<half::Options>("half", &words)?;
+        let outcome = half::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn half_of_one_step(&self) -> Result<Studied<half::Outcome>, Failure> {
+        self.half(self.one_step())
+    }
+
+    pub(super) fn half_of_many_steps(&self) -> Result<Studied<half::Outcome>, Failure> {
+        self.half(self.many_steps())
+    }
+}
+
+/// Studies of our own small piles, whatever the step of the report is.
+impl Effort<'_> {
+    pub(super) fn time_steps(&self) -> Result<Studied<time_step::Outcome>, Failure> {
+        let words =
+            words(if self.args.quick { "--grid 4x4x4" } else { "--grid 8x8x8 --seconds 4" });
+        let (command, options) = options::<time_step::Options>("time-step", &words)?;
+        let outcome = time_step::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = format!("{} s of a pile of {} cubes", outcome.seconds, outcome.grid);
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn stopping(&self) -> Result<Studied<stopping::Outcome>, Failure> {
+        let words =
+            words(if self.args.quick { "--passes 32" } else { "--passes 128 --grid 10x10x10" });
+        let (command, options) = options::<stopping::Options>("stopping", &words)?;
+        let outcome = stopping::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = outcome.step.clone();
+        Ok(Studied { command, subject, outcome })
+    }
+
+    pub(super) fn split(&self) -> Result<Studied<split::Outcome>, Failure> {
+        let grid = if self.args.quick { "12x12x12".to_owned() } else { self.args.grid.to_string() };
+        let (command, options) =
+            options::<split::Options>("split", &words(&format!("--grid {grid}")))?;
+        let outcome = split::measure(&options, self.session)?;
+        interrupted(outcome.complete)?;
+        let subject = format!("a pile of {} cubes", outcome.grid);
+        Ok(Studied { command, subject, outcome })
+    }
+}
+
+/// Refuses to go on with half an outcome.
+fn interrupted(complete: bool) -> Result<(), Failure> {
+    if complete {
+        return Ok(());
+    }
+    Err(Failure::new(Cause::Output, "interrupted: no report was written").next("run it again"))
+}
+
+/// The share of numbers that deviate by less than each edge of a histogram, percent.
+pub(super) fn below(histogram: &Histogram) -> Vec<(f64, f64)> {
+    let Histogram { edges_percent, counts, equal, below, above, .. } = histogram;
+    let all = equal + below + above + counts.iter().sum::<u64>();
+    let share = |count: u64| 100.0 * count as f64 / (all as f64).max(1.0);
+    let mut sum = equal + below;
+    let mut points = Vec::with_capacity(edges_percent.len());
+    for (edge, count) in edges_percent.iter().zip(counts.iter().chain([above])) {
+        points.push((*edge, share(sum)));
+        if sum == all {
+            break;
+        }
+        sum += count;
+    }
+    points
+}
+
+/// A share as percent.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.3} %", share * 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_below_rise_to_all_numbers() {
+        let pairs = [(1.0, 1.0), (1.0, 1.005), (1.0, 1.5)];
+        let points = below(&Histogram::of(pairs));
+        assert!(points.windows(2).all(|pair| pair[0].1 <= pair[1].1));
+        let at =
+            |edge: f64| points.iter().find(|point| point.0 >= edge * 0.999).expect("an edge").1;
+        assert!((at(0.1) - 100.0 / 3.0).abs() < 1e-9 && (at(1.0) - 200.0 / 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_commands_of_the_report_are_those_that_it_runs() {
+        let words = words("--grid 3x3x3 --steps 2 --pairs 1");
+        let (command, parsed) =
+            options::<determinism::Options>("determinism", &words).expect("parsed");
+        assert_eq!(command, "pgs study determinism --grid 3x3x3 --steps 2 --pairs 1");
+        assert_eq!(parsed.pairs, Some(1));
+        assert!(options::<determinism::Options>("determinism", &["--no".to_owned()]).is_err());
+    }
+}

@@ -1,0 +1,89 @@
+//! The report as Markdown and as JSON.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use super::document::{Figure, Origin, Row};
+use super::parts::Report;
+use super::tables::anchor;
+use crate::failure::Failure;
+use crate::output::SCHEMA;
+use crate::verbs::model::render;
+use crate::verbs::model::table::Table;
+
+/// What the report was made from.
+pub(super) fn preface(report: &Report) -> String {
+    let step = match report.given {
+        true => format!("Measured on {}.", report.step),
+        false => format!(
+            "Measured on {}: no folder with a step of Bullet was given (--input).",
+            report.step
+        ),
+    };
+    let effort = match report.quick {
+        true => " The quick report: fewer seeds and steps.",
+        false => "",
+    };
+    format!("{step}{effort}")
+}
+
+pub(super) fn json(report: &Report) -> Value {
+    json!({
+        "schema": SCHEMA,
+        "verb": "report",
+        "step": report.step,
+        "of_folder": report.given,
+        "quick": report.quick,
+        "index": report.part.rows.iter().map(Row::to_json).collect::<Vec<_>>(),
+        "figures": report.part.figures.iter().map(Figure::to_json).collect::<Vec<_>>(),
+        "tables": report.tables.iter().map(Table::to_json).collect::<Vec<_>>(),
+    })
+}
+
+pub(super) fn markdown(report: &Report) -> Result<String, Failure> {
+    let mut text =
+        format!("# The thesis' figures, from our own numbers\n\n{}\n\n", preface(report));
+    for origin in Origin::ALL {
+        let _ = writeln!(text, "- {} {}: {}", origin.mark(), origin.word(), origin.meaning());
+    }
+    text.push_str("\n## Index\n\n| thesis | subject | its figure | ours | | command |\n");
+    text.push_str("| :-- | :-- | :-- | :-- | :-- | :-- |\n");
+    for row in &report.part.rows {
+        let _ = writeln!(
+            text,
+            "| {} | [{}](#{}) | {} | {} | {} {} | `{}` |",
+            row.thesis,
+            row.subject.replace('|', "\\|"),
+            row.shown,
+            row.recorded.replace('|', "\\|"),
+            row.ours.replace('|', "\\|"),
+            row.origin.mark(),
+            row.origin.word(),
+            row.command
+        );
+    }
+    text.push_str("\n## Figures\n\n");
+    for figure in &report.part.figures {
+        let _ = writeln!(
+            text,
+            "<a id=\"{}\"></a>\n### {}: {}\n\n![{}]({})\n\n{} {}: {}\n",
+            figure.id,
+            figure.thesis,
+            figure.title,
+            figure.title,
+            figure.file(),
+            figure.origin.mark(),
+            figure.origin.word(),
+            figure.caption
+        );
+    }
+    text.push_str("## Tables\n\n");
+    let mut tables = Vec::new();
+    for table in &report.tables {
+        tables.extend_from_slice(format!("<a id=\"{}\"></a>\n", anchor(table)).as_bytes());
+        render::markdown(&mut tables, table)?;
+    }
+    text.push_str(&String::from_utf8_lossy(&tables));
+    Ok(text)
+}

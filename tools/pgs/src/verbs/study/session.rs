@@ -1,0 +1,52 @@
+//! The circumstances of a study: the options of every verb, Ctrl-C, and the progress it shows.
+
+use indicatif::ProgressBar;
+
+use crate::board::OpenBoard;
+use crate::common::CommonArgs;
+use crate::interrupt::Interrupt;
+use crate::output::progress::progress_bar;
+
+/// The circumstances of a study.
+#[derive(Debug)]
+pub(crate) struct Session {
+    pub(crate) common: CommonArgs,
+    interrupt: Interrupt,
+    bar: ProgressBar,
+}
+
+impl Session {
+    /// Takes over Ctrl-C, and shows the progress on a terminal.
+    pub(crate) fn new(common: &CommonArgs) -> Self {
+        Self::within(common, Interrupt::install(), progress_bar(0))
+    }
+
+    /// A session in a verb that has taken over Ctrl-C, and shows the progress in `bar`.
+    pub(crate) fn within(common: &CommonArgs, interrupt: Interrupt, bar: ProgressBar) -> Self {
+        Self { common: common.clone(), interrupt, bar }
+    }
+
+    /// Announces further steps.
+    pub(super) fn expect(&self, steps: u64) {
+        self.bar.inc_length(steps);
+    }
+
+    /// Tells that a step was taken.
+    pub(super) fn advance(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Clears the progress.
+    pub(super) fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.interrupt.is_set()
+    }
+
+    /// Lets Ctrl-C end a step of the board.
+    pub(super) fn watch(&self, opened: &mut OpenBoard) {
+        opened.accelerator.set_cancellation(self.interrupt.cancellation());
+    }
+}

@@ -1,0 +1,131 @@
+//! `pgs study` about the time step, stopping rules, the shares of a step and the ladder of designs:
+//! figures that a reader can compute by hand, and refusals.
+
+use crate::common::{golden, near, number, run, text};
+use serde_json::Value;
+
+/// Runs a study; returns its document.
+fn study(arguments: &[&str]) -> Value {
+    let ran = run([&["study"], arguments, &["--json"]].concat());
+    assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
+    assert!(ran.stderr.is_empty(), "{}", ran.stderr);
+    ran.json()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().expect("a list")
+}
+
+#[test]
+fn the_board_falls_as_explicit_euler_and_a_longer_step_costs_less() {
+    let document = study(&["time-step", "--grid", "2x2x2", "--seconds", "1"]);
+    let rows = list(&document["rows"]);
+    let rates: Vec<f64> = rows.iter().map(|row| number(&row["steps_per_second"])).collect();
+    assert_eq!(rates, [480.0, 240.0, 120.0, 60.0, 30.0, 15.0]);
+    for (row, rate) in rows.iter().zip(&rates) {
+        // g t dt / 2 after 1 s.
+        let off = 9.8 / rate / 2.0;
+        near(&row["flight"]["explicit_m"], off, 1e-6);
+        near(&row["flight"]["symplectic_m"], off, 1e-6);
+        near(&row["flight"]["board_m"], off, 1e-4);
+        near(&row["pile"]["steps"], *rate, 0.0);
+        let samples = list(&row["pile"]["samples"]);
+        assert_eq!(samples.len(), 16);
+        for (number, sample) in samples.iter().enumerate() {
+            near(&sample["seconds"], number as f64 / 15.0, 1e-12);
+        }
+        // Eight cubes of 1 kg and 2 m in two layers, their centres 2 m and 4 m up.
+        near(&samples[0]["potential_j"], 9.8 * 4.0 * (2.0 + 4.0), 1e-2);
+    }
+    near(&rows[0]["pile"]["distance_from_shortest_m"], 0.0, 0.0);
+    let costs: Vec<f64> =
+        rows.iter().map(|row| number(&row["pile"]["cycles_per_second"])).collect();
+    assert!(costs.windows(2).all(|two| two[1] < 0.6 * two[0]), "{costs:?}");
+}
+
+#[test]
+fn passes_solve_a_cube_on_the_ground_and_each_rule_ends_them() {
+    let folder = golden("one_cube");
+    let document =
+        study(&["stopping", "--input", text(&folder), "--passes", "40", "--spin-damping", "0"]);
+    let contact = list(&document["contact"]);
+    assert_eq!(contact.len(), 41);
+    let rms = |pass: &Value, kind: &str| number(&pass["residuals"][kind]["rms"]);
+    let (first, last) = (rms(&contact[0], "contact"), rms(&contact[40], "contact"));
+    assert!(first > 0.1 && last < 1e-5 * first, "{first} to {last}");
+    assert!(contact[0]["largest_change_n_s"].is_null());
+    for tolerance in list(&document["tolerances"]) {
+        let passes = number(&tolerance["contact"]["residual"]);
+        let limit = number(&tolerance["tolerance"]) * first;
+        let at = contact.iter().find(|pass| number(&pass["passes"]) >= passes).expect("a pass");
+        assert!(rms(at, "contact") <= limit, "{tolerance:#}");
+        assert!(number(&tolerance["contact"]["largest_change"]) >= 1.0);
+    }
+}
+
+#[test]
+fn a_pile_is_solved_further_with_every_pass_and_four_leave_some() {
+    let folder = golden("pile5_step60");
+    let document =
+        study(&["stopping", "--input", text(&folder), "--passes", "24", "--spin-damping", "0"]);
+    let rms = |pass: &Value, kind: &str| number(&pass["residuals"][kind]["rms"]);
+    for (passes, kind) in [("contact", "contact"), ("friction", "friction")] {
+        let course = list(&document[passes]);
+        let [first, fourth, last] = [0, 4, 24].map(|pass| rms(&course[pass], kind));
+        assert!(fourth < 0.2 * first && last < 0.3 * fourth, "{kind}: {first} {fourth} {last}");
+    }
+    // The step's own passes are one of the measured numbers.
+    assert_eq!(document["fixed"]["residuals"], document["friction"][4]["residuals"]);
+    // Friction passes take the contacts out of balance.
+    let contacts = |pass: &Value| rms(pass, "contact");
+    assert!(contacts(&document["fixed"]) > contacts(&document["contact"][4]));
+}
+
+#[test]
+fn search_and_response_share_a_step_and_the_thesis_gains_follow_from_its_share() {
+    let document = study(&["split", "--grid", "4x4x4", "--steps", "30", "--runs", "3"]);
+    assert_eq!(list(&document["samples"]).len(), 3);
+    let (median, share) = (&document["median"], number(&document["response_share"]));
+    let (search, response) = (number(&median["search_ms"]), number(&median["response_ms"]));
+    assert!(search > 0.0 && response > 0.0 && number(&median["board_ms"]) > 0.0, "{median:#}");
+    assert!((share - response / (search + response)).abs() < 1e-12);
+    let gains = list(&document["gains"]);
+    for (gain, whole) in [(&gains[0], 1.37), (&gains[2], 1.48)] {
+        near(&gain["recorded"], whole, 0.0);
+        near(&gain["whole_with_recorded_share"], whole, 0.005);
+    }
+}
+
+#[test]
+fn the_ladder_ends_with_the_two_designs_that_the_thesis_measured() {
+    let document = study(&["ladder"]);
+    let rungs = list(&document["rungs"]);
+    let of = |design: &str| {
+        rungs.iter().find(|rung| rung["design"] == design).expect("a design of this name")
+    };
+    for (design, modelled, recorded) in
+        [("float", 2_066_606.0, 2_062_697.0), ("half", 1_552_216.0, 1_557_317.0)]
+    {
+        near(&of(design)["cycles"], modelled, 0.0);
+        near(&of(design)["recorded_cycles"], recorded, 0.0);
+    }
+    assert!(rungs[0]["factor"].is_null());
+    let product: f64 = rungs[1..].iter().map(|rung| number(&rung["factor"])).product();
+    let last = rungs.last().expect("a design");
+    assert!((product / number(&last["factor_in_all"]) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_study_without_an_answer_is_refused() {
+    for arguments in [
+        &["study"][..],
+        &["study", "speed"],
+        &["study", "stopping", "--passes", "1"],
+        &["study", "stopping", "--input", "x", "--steps", "3"],
+        &["study", "time-step", "--seconds", "0"],
+        &["study", "split", "--runs", "0"],
+        &["study", "ladder", "--collisions", "0"],
+    ] {
+        assert_eq!(run(arguments).code, Some(2), "{arguments:?}");
+    }
+}
