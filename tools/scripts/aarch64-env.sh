@@ -19,3 +19,11 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-
 # -L: with the loader of one C library and the threads of another, a program hangs.
 export PGS_TEST_RUNNER="timeout 900 qemu-aarch64-static -cpu cortex-a53"
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=$PGS_TEST_RUNNER
+
+# Runs a command, or a function, that builds with a shared C library. A build with a static one makes no shared
+# library, and another C library needs a target directory of its own.
+with_shared_library() {
+	CARGO_TARGET_DIR=$target_root/aarch64-shared \
+		CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C strip=symbols" \
+		CC=aarch64-linux-gnu-gcc CXX=aarch64-linux-gnu-g++ "$@"
+}

@@ -37,15 +37,12 @@ if [ $run_tests = yes ]; then
 		-p zynq-pgs -p bitstream-model --lib
 	time_of attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" \
 		-p zynq-pgs -p bitstream-model --test it -- shortcuts shortcuts_buffers:: float_environment:: warm_start:: extensions::
-	# The examples in C and C++, with the static and the shared library. A build with a static C library has no
-	# shared one, and another C library needs a target directory of its own. The programs find their loader and
+	# The examples in C and C++, with the static and the shared library. The programs find their loader and
 	# C library where Debian's libc6 of arm64 has them, so that loader and threads are of one C library.
 	need_packages libc6:arm64
 	# The test names the example that it skips without a compiler.
 	(need_packages g++-aarch64-linux-gnu) || true
-	CARGO_TARGET_DIR=$target_root/aarch64-shared \
-		CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C strip=symbols" \
-		CC=aarch64-linux-gnu-gcc CXX=aarch64-linux-gnu-g++ time_of attend timeout "${TEST_LIMIT:-1200}" \
+	with_shared_library time_of attend timeout "${TEST_LIMIT:-1200}" \
 		cargo test --release --locked --target "$aarch64" -p zynq-pgs-c --test examples
 	# Bullet's bits from the binary itself, which no test has to be built for.
 	for folder in tests/golden/*/ ${PGS_VECTORS:+"$PGS_VECTORS"/*/}; do

@@ -24,7 +24,7 @@ end_all() {
 	trap - EXIT
 	[ ${#running[@]} = 0 ] || kill "${!running[@]}" 2>/dev/null || true
 	wait
-	[ ${#litter[@]} = 0 ] || rm -rf "${litter[@]}"
+	[ ${#litter[@]} = 0 ] || rm -rf --one-file-system "${litter[@]}"
 	exit "$code"
 }
 trap end_all EXIT

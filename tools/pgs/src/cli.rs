@@ -47,6 +47,12 @@ struct Cli {
     run: RunArgs,
 }
 
+/// The definition of the command line, for pages and completions.
+#[cfg(feature = "pages")]
+pub(crate) fn definition() -> clap::Command {
+    Cli::command()
+}
+
 /// A parsed command line.
 #[derive(Debug, Clone)]
 pub(crate) struct Command {

@@ -23,6 +23,8 @@ mod narrow;
 mod numbers;
 mod options;
 mod output;
+#[cfg(feature = "pages")]
+mod pages;
 mod permutation;
 mod power;
 mod step_input;
@@ -60,6 +62,10 @@ fn survive_file_limit() {
 fn main() -> ExitCode {
     log_to_stderr();
     survive_file_limit();
+    #[cfg(feature = "pages")]
+    if let Some(code) = pages::generate_if_asked() {
+        return code;
+    }
     let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => return failure::report_usage(&message),
