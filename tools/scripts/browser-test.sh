@@ -2,8 +2,8 @@
 # Opens the pages that pgs writes in a headless Chromium, uses them, and measures pictures a second. A page that
 # reports an error, stays uniform, ignores a control or asks the network for something fails it.
 #
-# usage: browser-test.sh                     two small scenes, written for the test
-#        browser-test.sh KIND=PAGE.html...   these pages; kinds are the functions of browser/pages.js: view
+# usage: browser-test.sh                     two small scenes and the quick report, written for the test
+#        browser-test.sh KIND=PAGE.html...   these pages; kinds are the functions of browser/pages.js: report, view
 #
 # Screenshots go to target/browser. Needs Node.js, npm and Chromium; installs chromium (Debian's package) where it
 # may, and fetches playwright-core with npm.
@@ -40,10 +40,17 @@ if ! cmp -s "$work/package-lock.json" "$work/node_modules/.lock"; then
 fi
 
 if [ ${#pages[@]} = 0 ]; then
-	attend cargo build --release --quiet --locked -p pgs
-	pgs=$target_root/release/pgs
+	attend cargo build --quiet --locked -p pgs --features report
+	pgs=$target_root/debug/pgs
+	export PGS_BOARD=emulated
 	attend "$pgs" run --grid 6x5x6 --steps 120 --view "$work/cubes.html" > /dev/null
 	attend "$pgs" run --scene shapes --grid 4x4x4 --steps 180 --view "$work/shapes.html" > /dev/null
-	pages=("view=$work/cubes.html" "view=$work/shapes.html")
+	# The golden step is small; of Bullet's full step the report takes minutes less than of a pile of our own.
+	input=tests/golden/pile5_step60
+	[ -z "${PGS_VECTORS-}" ] || input=$PGS_VECTORS/full_step186
+	SECONDS=0
+	attend "$pgs" report --out "$work/report" --quick --input "$input" > /dev/null
+	echo "report --quick: $SECONDS s"
+	pages=("view=$work/cubes.html" "view=$work/shapes.html" "report=$work/report/report.html")
 fi
 NODE_PATH=$work/node_modules attend node tools/scripts/browser/browser-test.js "$browser" "$work" "${pages[@]}"

@@ -41,8 +41,9 @@ async function test(context, kind, file, folder) {
 			console.log(`${name}: ${rate.toFixed(1)} pictures a second ${what}, ${width} x ${height} pixels (${Math.round(100 * row)} % of the rows)`);
 			return rate;
 		},
-		async screenshot() {
-			const picture = path.join(folder, `${path.parse(file).name}.png`);
+		async screenshot(part) {
+			const stem = [path.parse(file).name, part].filter(Boolean).join("-");
+			const picture = path.join(folder, `${stem}.png`);
 			await page.screenshot({ path: picture });
 			console.log(`${name}: screenshot ${picture}`);
 		},

@@ -76,4 +76,59 @@ async function view(page, { measure, screenshot }) {
 	await screenshot();
 }
 
-module.exports = { view };
+// The figures of the thesis that the report draws, and the recorded numbers that it sets beside ours.
+const FIGURES = [
+	"2-2", "2-6", "2-8", "4-1", "4-2", "4-5", "4-6", "4-7", "4-8", "4-9", "4-10", "4-13", "5-1", "5-2", "6-1", "6-2",
+];
+const RECORDED = ["2.97 %", "84.29 %", "99.93 %", "0.02 %", "99.64 %", "0.06 %", "1,528"];
+
+// The page of `pgs report`.
+async function report(page, { screenshot }) {
+	const found = await page.evaluate(() => ({
+		figures: Array.from(document.querySelectorAll("figure"), figure => {
+			const svg = figure.querySelector("svg");
+			const { width, height } = svg.getBoundingClientRect();
+			const drawn = svg.querySelectorAll("polyline, path, rect, circle, polygon").length;
+			return { id: figure.id, width, height, drawn, caption: figure.querySelector("figcaption").textContent };
+		}),
+		rows: Array.from(document.querySelectorAll("table.index tbody tr"), row =>
+			Array.from(row.cells, cell => cell.textContent.trim())),
+		lost: Array.from(document.querySelectorAll("a[href^='#']"), link => link.hash.slice(1))
+			.filter(id => !document.getElementById(id)),
+	}));
+	for (const { id, width, height, drawn, caption } of found.figures) {
+		assert.ok(width > 300 && height > 100 && drawn > 3, `${id} is drawn: ${width} x ${height}, ${drawn} shapes`);
+		assert.ok(caption.length > 10, `${id} has a caption`);
+	}
+	const ids = found.figures.map(figure => figure.id);
+	for (const number of FIGURES) assert.ok(ids.includes(`figure-${number}`), `figure ${number} is there`);
+	assert.deepEqual(found.lost, [], "every link of the index leads to a figure or a table");
+	assert.ok(found.rows.length > 40, `the index has ${found.rows.length} rows`);
+	for (const cells of found.rows) {
+		assert.equal(cells.length, 6, "thesis, subject, its figure, ours, origin, command");
+		for (const cell of cells) assert.notEqual(cell, "", `a row of the index has no empty cell: ${cells.join(" | ")}`);
+	}
+	for (const number of RECORDED) {
+		const row = found.rows.find(cells => cells[2].includes(number));
+		assert.ok(row, `the recorded ${number} is in the index`);
+		assert.match(row[3], /[0-9]/, `ours stands beside ${number}`);
+	}
+	const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+	const grounds = new Set();
+	for (const colorScheme of ["light", "dark"]) {
+		await page.emulateMedia({ colorScheme });
+		grounds.add(await ground());
+	}
+	assert.equal(grounds.size, 2, "light and dark differ");
+	await page.emulateMedia({ colorScheme: "light" });
+	await screenshot();
+	await page.locator("#figure-4-2").scrollIntoViewIfNeeded();
+	await screenshot("figures");
+
+	await page.locator("details summary").first().click();
+	await page.locator("iframe").first().scrollIntoViewIfNeeded();
+	const player = await (await page.locator("iframe").first().elementHandle()).contentFrame();
+	await player.waitForFunction(() => window.player && window.player.pictures > 2, null, { timeout: 60000 });
+}
+
+module.exports = { report, view };

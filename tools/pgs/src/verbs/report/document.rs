@@ -56,6 +56,8 @@ pub(super) struct Figure {
     pub(super) svg: String,
     pub(super) caption: String,
     pub(super) origin: Origin,
+    /// A page of its own that plays the subject.
+    pub(super) playback: Option<String>,
 }
 
 /// A row of the index: a statement of the thesis beside ours.

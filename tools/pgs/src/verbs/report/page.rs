@@ -80,13 +80,22 @@ fn figure(text: &mut String, figure: &Figure) {
     let title = format!("{}: {}", figure.thesis, figure.title);
     let _ = writeln!(
         text,
-        "<figure id=\"{}\">\n<h3>{}</h3>\n{}<figcaption>{} {}</figcaption>\n</figure>",
+        "<figure id=\"{}\">\n<h3>{}</h3>\n{}<figcaption>{} {}</figcaption>",
         figure.id,
         escaped(&title),
         named(&figure.svg, &title),
         tag(figure.origin),
         escaped(&figure.caption)
     );
+    if let Some(playback) = &figure.playback {
+        let _ = writeln!(
+            text,
+            "<details><summary>Play it</summary>\n<iframe loading=\"lazy\" title=\"Playback\" \
+             srcdoc=\"{}\"></iframe></details>",
+            escaped(playback)
+        );
+    }
+    text.push_str("</figure>\n");
 }
 
 /// The picture with a name for people who cannot see it.

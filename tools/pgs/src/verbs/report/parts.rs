@@ -56,6 +56,8 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     part.append(figures::separation::part());
     about("stopping rules and shares of a step");
     part.append(figures::solver::part(&effort)?);
+    about("the pile");
+    part.append(figures::pile::part(&effort, common)?);
     let tables = thesis_tables();
     part.rows.extend(tables::of_chapter_4(&tables)?);
     about("orders of the collisions");

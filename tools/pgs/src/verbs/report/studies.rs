@@ -1,6 +1,7 @@
 //! The studies behind the report's figures, with the commands that repeat them.
 
 use clap::{Args, Command};
+use scene::Grid;
 
 use super::ReportArgs;
 use crate::failure::{Cause, Failure};
@@ -60,6 +61,12 @@ impl<'a> Effort<'a> {
                 (words, format!("step {step} of our pile of {grid} cubes"))
             }
         }
+    }
+
+    /// The pile that is shown: a smaller one in a quick report.
+    pub(super) fn pile(&self) -> Grid {
+        let small = Grid::new(18, 15, 18).unwrap_or_default();
+        if self.args.quick && self.args.grid == Grid::default() { small } else { self.args.grid }
     }
 
     /// Many steps of our own pile: a small one in a quick report.

@@ -60,6 +60,7 @@ fn figure(
         svg: bars("times", &groups, &names.map(str::to_owned), &values)?,
         caption: caption.to_owned(),
         origin: Origin::Modelled,
+        playback: None,
     })
 }
 

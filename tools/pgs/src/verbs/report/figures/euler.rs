@@ -44,6 +44,7 @@ pub(crate) fn part() -> Result<Part, Failure> {
                   explicit rule for a body in free flight."
             .to_owned(),
         origin: Origin::Modelled,
+        playback: None,
     };
     let row = Row {
         thesis: "§2.1.3, Figure 2.6".to_owned(),

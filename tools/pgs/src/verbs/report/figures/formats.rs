@@ -76,6 +76,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
                 grouped(sizes.zeros)
             ),
             origin: Origin::Measured,
+            playback: None,
         })
     };
     let error_axis = Axis::log("error, % of the number");
@@ -87,7 +88,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         let series = [Series::new("error", Drawn::Dots, dots)];
         let svg = lines(x, error_axis, &series)?;
         let title = title.to_owned();
-        Ok(Figure { id, thesis, title, svg, caption, origin: Origin::Measured })
+        Ok(Figure { id, thesis, title, svg, caption, origin: Origin::Measured, playback: None })
     };
     let figures = vec![
         spread("figure-4-5", "Figure 4.5", "Input numbers in binary32, by magnitude", &values)?,

@@ -28,6 +28,7 @@ fn spread(one: &Studied<Outcome>) -> Result<Figure, Failure> {
             one.subject
         ),
         origin: Origin::Measured,
+        playback: None,
     })
 }
 
@@ -51,6 +52,7 @@ fn energies(many: &Studied<Outcome>) -> Result<Figure, Failure> {
             many.subject
         ),
         origin: Origin::Measured,
+        playback: None,
     })
 }
 

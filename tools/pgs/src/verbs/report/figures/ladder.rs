@@ -21,6 +21,7 @@ pub(crate) fn part() -> Result<Part, Failure> {
         caption: "From words that the processor writes one by one to half precision, on the thesis' step."
             .to_owned(),
         origin: Origin::Modelled,
+        playback: None,
     };
     let row = |rung: &Rung| Row {
         thesis: rung.thesis.to_owned(),

@@ -67,6 +67,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
             step.name
         ),
         origin: Origin::Measured,
+        playback: None,
     };
     let ours: Vec<String> = most
         .iter()

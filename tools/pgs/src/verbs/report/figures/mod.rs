@@ -7,6 +7,7 @@ pub(super) mod half;
 pub(super) mod ladder;
 pub(super) mod live;
 pub(super) mod orders;
+pub(super) mod pile;
 pub(super) mod separation;
 pub(super) mod solver;
 pub(super) mod stages;

@@ -48,6 +48,7 @@ fn over_steps(many: &Studied<Outcome>) -> Result<Figure, Failure> {
             many.subject
         ),
         origin: Origin::Measured,
+        playback: None,
     })
 }
 
@@ -84,6 +85,7 @@ fn after_steps(one: &Studied<Outcome>, many: &Studied<Outcome>) -> Result<Figure
             one.subject, one.outcome.gpu_order, many.subject
         ),
         origin: Origin::Measured,
+        playback: None,
     })
 }
 

@@ -127,6 +127,7 @@ pub(crate) fn part() -> Part {
                   top."
             .to_owned(),
         origin: Origin::Modelled,
+        playback: None,
     };
     let row = Row {
         thesis: "§2.2.2, Figure 2.8".to_owned(),

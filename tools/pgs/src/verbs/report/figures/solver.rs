@@ -32,6 +32,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
             outcome.step
         ),
         origin: Origin::Measured,
+        playback: None,
     };
     let passes =
         |passes: Option<u32>| passes.map_or("more".to_owned(), |passes| passes.to_string());

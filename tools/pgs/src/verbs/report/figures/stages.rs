@@ -61,6 +61,7 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
         svg,
         caption: caption.to_owned(),
         origin: Origin::Measured,
+        playback: None,
     };
     let figures = vec![
         figure(

@@ -39,6 +39,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
             studied.subject
         ),
         origin: Origin::Measured,
+        playback: None,
     };
     let at = |rate: u16| rows.iter().find(|row| row.steps_per_second == rate);
     let ours = [480, 60, 15].into_iter().filter_map(at).map(|row| {
