@@ -125,7 +125,7 @@ impl Energy {
     }
 }
 
-/// The energy of a step of so many milliseconds at the thesis' power, for boards without sensors.
+/// The energy of a step that takes `ms` milliseconds, at the thesis' power, for boards without sensors.
 pub(crate) fn at_thesis_power(ms: f64) -> (String, Value) {
     let joules = ZCU102_WATTS * ms / 1e3;
     let text = format!(

@@ -10,7 +10,7 @@ use super::sensors::{SensorError, Sensors, Watts};
 /// Samples of the idle board before the first step.
 const IDLE_SAMPLES: u32 = 30;
 
-/// A meter that samples until it is asked for the energy.
+/// Samples the sensors until [`stop`](Self::stop).
 #[derive(Debug)]
 pub(crate) struct PowerMeter {
     sensors: Sensors,

@@ -32,7 +32,7 @@ pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, F
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
     }
-    // Whatever the machine has: the report measures steps of the emulated board.
+    // The report measures the emulated board, also on a machine that has a real one.
     let mut common = common.clone();
     if common.board == BoardName::Auto {
         common.board = BoardName::Emulated;

@@ -18,8 +18,8 @@ pub(super) fn start(is_emulated: bool) -> Option<PowerMeter> {
     }
 }
 
-/// The energy of a step for people and for programs: measured, or at the thesis' power for a step of
-/// so many milliseconds.
+/// The energy of a step for people and for programs: measured, or at the thesis' power for a step that
+/// takes `ms` milliseconds.
 pub(super) fn end(meter: Option<PowerMeter>, steps: u32, ms: f64) -> (String, Value) {
     match meter.map(|meter| meter.stop(steps)) {
         Some(Ok(Some(energy))) => return (energy.text(), energy.to_json()),

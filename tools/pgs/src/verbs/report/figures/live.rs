@@ -10,7 +10,7 @@ use crate::numbers::grouped;
 
 /// Bodies that the thesis' order keeps alive at most.
 const RECORDED: u32 = 1528;
-/// Ranges of slots of which a curve shows the maximum.
+/// Ranges of slots; a curve shows the maximum of each.
 const RANGES: usize = 400;
 /// Depth of the float profile's pipeline, issue slots.
 const DEPTH: u32 = 64;
