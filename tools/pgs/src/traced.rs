@@ -19,7 +19,7 @@ use crate::options::build::described;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Inside a step (emulated board)")]
 pub(crate) struct TracedArgs {
-    /// Write streams, registers, stages and the interrupt of the step to FILE, for GTKWave
+    /// Write streams, registers, stages and the interrupt of the step to FILE, for `GTKWave`
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
     /// Write the course of the step to FILE as JSON, for Perfetto (<https://ui.perfetto.dev>)

@@ -35,18 +35,29 @@ pub(crate) fn polyhedron(points: &[[f32; 3]]) -> Option<ConvexPolyhedron> {
     ConvexPolyhedron::from_convex_hull(&points)
 }
 
+/// The faces of the convex hull of points, each as its corners in the order that is
+/// counter-clockwise from outside. None if the hull has no volume.
+#[must_use]
+pub fn faces(points: &[[f32; 3]]) -> Option<Vec<Vec<[f32; 3]>>> {
+    let hull = polyhedron(points)?;
+    let corners = hull.vertices_adj_to_face();
+    let faces = hull.faces().iter().map(|face| {
+        let begin = face.first_vertex_or_edge as usize;
+        let corners = &corners[begin..][..face.num_vertices_or_edges as usize];
+        corners.iter().map(|corner| hull.points()[*corner as usize].to_array()).collect()
+    });
+    Some(faces.collect())
+}
+
 /// The moments of inertia about x, y and z of the solid hull of points, m² (per kg). None without a
 /// volume, if the centre of mass is not the origin, or if the axes are not the principal ones.
 pub(crate) fn inertia_per_mass(points: &[[f32; 3]]) -> Option<[f64; 3]> {
-    let hull = polyhedron(points)?;
+    let faces = faces(points)?;
     let mut volume = 0.0;
     let mut first = [0.0; 3];
     let mut second = [[0.0; 3]; 3];
-    for face in hull.faces() {
-        let begin = face.first_vertex_or_edge as usize;
-        let corners = &hull.vertices_adj_to_face()[begin..][..face.num_vertices_or_edges as usize];
-        let corner =
-            |index: usize| hull.points()[corners[index] as usize].to_array().map(f64::from);
+    for corners in faces {
+        let corner = |index: usize| corners[index].map(f64::from);
         // Tetrahedra from the origin to the triangles of the face.
         for k in 2..corners.len() {
             let [a, b, c] = [corner(0), corner(k - 1), corner(k)];

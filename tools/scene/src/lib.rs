@@ -47,6 +47,7 @@ pub use error::SceneError;
 pub use frames::{StepClock, interpolate};
 pub use geometry::Geometry;
 pub use grid::Grid;
+pub use hull::faces as hull_faces;
 pub use measure::{
     KineticEnergy, Momentum, Penetration, axes, carry_along, ground_pairs, kinetic_energy,
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,

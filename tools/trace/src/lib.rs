@@ -1,4 +1,4 @@
-//! Writes the course of one step on an emulated board: as a VCD for GTKWave, as trace events for
+//! Writes the course of one step on an emulated board: as a VCD for `GTKWave`, as trace events for
 //! Perfetto, as a picture.
 //!
 //! The step was recorded by the board ([`recording`](bitstream_model::recording)). All three tell its

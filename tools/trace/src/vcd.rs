@@ -1,4 +1,4 @@
-//! Writes a recorded step as a value change dump (IEEE 1364, clause 18), for GTKWave.
+//! Writes a recorded step as a value change dump (IEEE 1364, clause 18), for `GTKWave`.
 //!
 //! Time counts from the begin of the recording, in picoseconds; each change stands at an edge of the
 //! accelerator's clock, which itself is left out. Names of registers and stages are ASCII in vectors.
@@ -200,7 +200,7 @@ impl TracedStep<'_> {
                 values[signal.0].clone_from(value);
             }
         }
-        let end = changes.keys().next_back().map_or(0, |last| last + 1);
+        let end = changes.keys().next_back().copied().unwrap_or_default();
         writeln!(out, "#{}", self.picoseconds(end.max(self.recording.span.end)))
     }
 }

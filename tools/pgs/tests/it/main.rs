@@ -15,6 +15,7 @@ mod detect;
 mod documents;
 mod environment;
 mod faults;
+mod files;
 mod golden;
 mod kill;
 mod list;

@@ -152,7 +152,8 @@ pub(crate) fn assert_agrees(taken: &Taken) {
     assert_eq!(dump.clocks(&["board.accelerator.waits".to_owned()]), cycles.waits);
     let rises = dump.rises("board.interrupt");
     assert_eq!(rises.len() as u64, after.interrupts - before.interrupts);
-    assert_eq!(dump.end, recording.span.end);
+    // The pulse of an access in the last clock ends after it.
+    assert!((0..=1).contains(&(dump.end - recording.span.end)), "{}", dump.end);
 }
 
 #[test]

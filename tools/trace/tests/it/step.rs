@@ -27,7 +27,10 @@ pub(crate) struct Taken {
 fn body(x: f32, y: f32, shape: u32) -> Body {
     Body {
         pose: Pose { position: [x, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] },
-        velocity: Velocity { linear: [0.0, -1.0 * f32::from(shape != 0), 0.0], angular: [0.0; 3] },
+        velocity: Velocity {
+            linear: [0.0, if shape == 0 { 0.0 } else { -1.0 }, 0.0],
+            angular: [0.0; 3],
+        },
         shape,
     }
 }

@@ -2,6 +2,7 @@
 
 mod beside;
 mod energy;
+mod files;
 mod row;
 mod summary;
 
@@ -14,6 +15,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
+use self::files::{FileArgs, Film, Written};
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::{Summary, Totals};
 use crate::board::{self, OpenBoard};
@@ -55,6 +57,8 @@ Examples:
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
+  pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
+  pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -119,6 +123,8 @@ pub(crate) struct RunArgs {
     /// Step to show the inside of [default: the last]
     #[arg(long, value_name = "N", help_heading = "Inside a step (emulated board)", value_parser = clap::value_parser!(u32).range(1..))]
     traced_step: Option<u32>,
+    #[command(flatten)]
+    files: FileArgs,
 }
 
 impl RunArgs {
@@ -194,6 +200,8 @@ struct Course {
     cold: Option<Cold>,
     /// The energy of a step, for people and for programs.
     energy: Option<(String, Value)>,
+    /// The poses for the files.
+    film: Option<Film>,
 }
 
 /// Steps the scene.
@@ -202,6 +210,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    args.files.check()?;
     let build = args.build.build();
     let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
@@ -216,6 +225,7 @@ pub(crate) fn run(
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
+    course.film = args.files.film(&scene, args.steps(), parameters.time_step);
 
     let meter = energy::start(is_emulated(&opened));
     let scenes = (&mut scene, &mut course);
@@ -223,13 +233,43 @@ pub(crate) fn run(
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
     course.energy = Some(energy::end(meter, course.done, course.totals.mean()));
     let complete = course.done == args.steps();
+    let written = write_files(args, &opened, &scene, &mut course)?;
     if common.json {
-        let document = document(args, &parameters, &opened, &mut scene, course, complete);
+        let mut document = document(args, &parameters, &opened, &mut scene, course, complete);
+        for file in written {
+            document["files"][file.label] = file.document;
+        }
         writeln!(out, "{document:#}")?;
     } else {
         print_end(args, &parameters, &opened, &mut scene, &mut course, out)?;
+        for file in written {
+            fact(out, file.label, &file.text)?;
+        }
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+}
+
+/// Writes the files of the poses, and the picture.
+fn write_files(
+    args: &RunArgs,
+    opened: &OpenBoard,
+    scene: &Scene,
+    course: &mut Course,
+) -> Result<Vec<Written>, Failure> {
+    let mut written = Vec::new();
+    if let Some(film) = &mut course.film {
+        film.end(course.done, scene);
+        let digest = digest::of_bodies(scene.bodies());
+        let facts = [
+            ("scene", args.scene.text()),
+            ("board", opened.accelerator.board().to_string()),
+            ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
+            ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
+        ];
+        written = args.files.write(film, &args.scene.text(), &facts)?;
+    }
+    written.extend(args.files.write_picture(scene)?);
+    Ok(written)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.
@@ -269,6 +309,9 @@ fn take_steps(
             opened.alive()?;
         }
         course.done += 1;
+        if let Some(film) = &mut course.film {
+            film.step(course.done, scene);
+        }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
         course.footprint.include(&variant, &row.report);

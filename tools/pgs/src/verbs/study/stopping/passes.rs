@@ -27,6 +27,9 @@ enum Counted {
     Friction,
 }
 
+/// The bodies and the impulses of a solved step.
+type Solved = (Vec<Body>, Vec<Impulses>);
+
 /// The step, and the board that takes it.
 pub(super) struct Course<'a> {
     pub(super) opened: &'a mut OpenBoard,
@@ -77,10 +80,7 @@ impl Course<'_> {
 
     /// The velocities and impulses after the passes. Without a pass nothing has changed, and the board
     /// takes no step.
-    fn solve(
-        &mut self,
-        [contact, friction]: [u32; 2],
-    ) -> Result<Option<(Vec<Body>, Vec<Impulses>)>, Failure> {
+    fn solve(&mut self, [contact, friction]: [u32; 2]) -> Result<Option<Solved>, Failure> {
         let mut bodies = self.step.bodies.clone();
         if contact + friction == 0 {
             self.session.advance();

@@ -1,0 +1,97 @@
+//! The files of `pgs run`: poses, page and picture.
+
+use std::fs;
+use std::path::Path;
+
+use crate::common::{Ran, number, run, text};
+use serde_json::Value;
+
+const SCENE: [&str; 8] =
+    ["run", "--scene", "shapes", "--grid", "3x2x3", "--steps", "7", "--beside-cold=false"];
+
+fn ran(options: &[&str]) -> Ran {
+    let ran = run(SCENE.iter().chain(options));
+    assert_eq!(ran.code, Some(0), "{options:?}: {}", ran.stderr);
+    ran
+}
+
+fn length(path: &Path) -> u64 {
+    fs::metadata(path).expect("the file").len()
+}
+
+#[test]
+fn a_run_writes_the_files_that_it_names() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [poses, view, picture] =
+        ["poses.npz", "view.html", "picture.png"].map(|name| folder.path().join(name));
+    let files = [
+        "--poses",
+        text(&poses),
+        "--view",
+        text(&view),
+        "--picture",
+        text(&picture),
+        "--every",
+        "3",
+    ];
+    let document = ran(&[&files[..], &["--json"]].concat()).json();
+    // The start, steps 3 and 6, and the last one.
+    let written = &document["files"];
+    assert_eq!((&written["poses"]["frames"], &written["view"]["frames"]), (&4.into(), &4.into()));
+    for (label, path) in [("poses", &poses), ("view", &view), ("picture", &picture)] {
+        assert_eq!(written[label]["path"], text(path));
+        assert_eq!(written[label]["bytes"], length(path), "{label}");
+    }
+    assert!((1e-6..1e-3).contains(&number(&written["view"]["largest_error_m"])));
+    assert!((0.01..0.08).contains(&number(&written["view"]["largest_error_degrees"])));
+    let page = fs::read_to_string(&view).expect("the page");
+    let digest = document["digest"]["value"].as_str().expect("a digest");
+    assert!(page.contains(digest), "the page names the run's digest");
+
+    // The same bits again, with another number of threads.
+    let bytes = [&poses, &picture].map(|path| fs::read(path).expect("a file"));
+    let printed = ran(&[&files[..], &["--threads", "3"]].concat()).stdout;
+    assert_eq!([&poses, &picture].map(|path| fs::read(path).expect("a file")), bytes);
+    for line in ["poses      ", "view       ", "picture    "] {
+        assert!(printed.lines().any(|found| found.starts_with(line)), "{line}: {printed}");
+    }
+}
+
+#[test]
+fn the_name_of_a_file_tells_its_format() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let begins = |option: &str, name: &str| {
+        let path = folder.path().join(name);
+        ran(&[option, text(&path), "--frames", "2"]);
+        String::from_utf8_lossy(&fs::read(&path).expect("a file")[..20]).into_owned()
+    };
+    assert!(begins("--poses", "a.npz").starts_with("PK\u{3}\u{4}"));
+    assert!(begins("--poses", "a.glb").starts_with("glTF"));
+    assert!(begins("--picture", "a.svg").starts_with("<svg "));
+    assert!(begins("--poses", "a.gltf").starts_with("{\"asset\":"));
+    let path = folder.path().join("a.gltf");
+    let document: Value = serde_json::from_slice(&fs::read(path).expect("a file")).expect("JSON");
+    assert_eq!(document["nodes"].as_array().map(Vec::len), Some(19));
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_refused_before_the_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let refused = |option: &str, name: &str, said: &[&str]| {
+        let path = folder.path().join(name);
+        let ran = run(SCENE.iter().chain(&[option, text(&path)]));
+        assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{name}");
+        for said in said {
+            assert!(ran.stderr.contains(said), "{name}: {}", ran.stderr);
+        }
+        assert!(!path.exists());
+    };
+    refused("--poses", "poses.csv", &["expected a name that ends in .npz or .glb or .gltf"]);
+    refused("--view", "view", &["expected a name that ends in .html"]);
+    refused("--picture", "a.jpg", &["expected a name that ends in .png or .svg"]);
+    refused(
+        "--view",
+        "missing/view.html",
+        &["expected a folder to write", "next: make the folder"],
+    );
+}

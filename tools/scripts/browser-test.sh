@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Opens the pages that pgs writes in a headless Chromium, uses them, and measures pictures a second. A page that
+# reports an error, stays uniform, ignores a control or asks the network for something fails it.
+#
+# usage: browser-test.sh                     two small scenes, written for the test
+#        browser-test.sh KIND=PAGE.html...   these pages; kinds are the functions of browser/pages.js: view
+#
+# Screenshots go to target/browser. Needs Node.js, npm and Chromium; installs chromium (Debian's package) where it
+# may, and fetches playwright-core with npm.
+# environment: CHROMIUM (the browser's path)
+#
+# Exit code: 0 passed, 1 failed, 77 skipped: not on this machine.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+case ${1-} in
+-h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0"; exit 0 ;;
+esac
+
+pages=()
+for page in "$@"; do
+	pages+=("${page%%=*}=$(realpath "${page#*=}")")
+done
+cd "$repository"
+command -v node >/dev/null && command -v npm >/dev/null || need_packages nodejs npm
+browser=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)}
+if [ -z "$browser" ]; then
+	need_packages chromium
+	browser=$(command -v chromium) || skip "chromium is installed and not found"
+fi
+
+# The packages of the lock file, beside what cargo builds.
+work=$target_root/browser
+mkdir -p "$work"
+cp tools/scripts/browser/package.json tools/scripts/browser/package-lock.json "$work"
+if ! cmp -s "$work/package-lock.json" "$work/node_modules/.lock"; then
+	(cd "$work" && timeout 300 npm ci --ignore-scripts --no-audit --no-fund > npm.log 2>&1) ||
+		{ tail -n 5 "$work/npm.log" >&2; skip "npm cannot fetch playwright-core"; }
+	cp "$work/package-lock.json" "$work/node_modules/.lock"
+fi
+
+if [ ${#pages[@]} = 0 ]; then
+	attend cargo build --release --quiet --locked -p pgs
+	pgs=$target_root/release/pgs
+	attend "$pgs" run --grid 6x5x6 --steps 120 --view "$work/cubes.html" > /dev/null
+	attend "$pgs" run --scene shapes --grid 4x4x4 --steps 180 --view "$work/shapes.html" > /dev/null
+	pages=("view=$work/cubes.html" "view=$work/shapes.html")
+fi
+NODE_PATH=$work/node_modules attend node tools/scripts/browser/browser-test.js "$browser" "$work" "${pages[@]}"

@@ -1,0 +1,196 @@
+//! Writes a recording as one HTML page that plays it, without a network.
+//!
+//! The page's parts are the files beside this module; their data comes from `quantise`.
+
+use scene::Geometry;
+use serde_json::{Value, json};
+
+use crate::base64;
+use crate::mesh::{Mesh, dot};
+use crate::quantise;
+use crate::recording::Recording;
+
+pub use crate::quantise::Error;
+
+const PAGE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
+/// The scripts, in the order in which they use each other.
+const SCRIPTS: [&str; 7] = [
+    include_str!("decode.js"),
+    include_str!("poses.js"),
+    include_str!("camera.js"),
+    include_str!("hidden.js"),
+    include_str!("draw.js"),
+    include_str!("colours.js"),
+    include_str!("player.js"),
+];
+
+/// The page of a recording.
+#[derive(Debug)]
+pub struct Page {
+    /// Its text.
+    pub html: String,
+    /// The largest error of a pose on the page, as it stands among its facts.
+    pub error: Error,
+}
+
+/// Makes the page; `facts` are labels and texts about the run.
+#[must_use]
+pub fn page(recording: &Recording, title: &str, facts: &[(&str, String)]) -> Page {
+    let found = quantise::quantise(recording);
+    let error = found.error;
+    let (low, high) = view(recording);
+    let head = json!({
+        "bodies": recording.bodies(),
+        "times": recording.frames().iter().map(|frame| frame.time).collect::<Vec<_>>(),
+        "kinds": recording.geometries().iter().map(kind).collect::<Vec<_>>(),
+        "low": found.low,
+        "quantum": found.quantum,
+        "componentMost": found.component_most,
+        "speedMost": found.speed_most,
+        "view": { "low": low, "high": high },
+    });
+    let own = ("poses", format!("{} frames, {}", recording.frames().len(), error.text()));
+    let facts = facts.iter().map(|(label, text)| (*label, text.as_str()));
+    let facts: String = facts
+        .chain([(own.0, own.1.as_str())])
+        .map(|(label, text)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(label), escaped(text)))
+        .collect();
+    let poses = base64::encode(&found.bytes);
+    let script = SCRIPTS.join("\n");
+    let html = filled(
+        PAGE,
+        &[
+            ("title", &escaped(title)),
+            ("style", STYLE),
+            ("facts", &facts),
+            // Nothing in a JSON text may end the element around it.
+            ("head", &head.to_string().replace('<', "\\u003c")),
+            ("poses", &poses),
+            ("script", &script),
+        ],
+    );
+    Page { html, error }
+}
+
+impl Error {
+    /// The error for people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        format!(
+            "largest error from rounding {:.2} mm and {:.2} degrees",
+            1e3 * self.distance,
+            self.angle
+        )
+    }
+}
+
+/// The box around all centres of the last frame and of the first, where most of the motion is.
+fn view(recording: &Recording) -> ([f32; 3], [f32; 3]) {
+    let frames = recording.frames();
+    let poses = || frames.first().into_iter().chain(frames.last()).flat_map(|frame| &frame.poses);
+    let most = |axis: usize, sign: f32| {
+        let values = poses().map(|pose| sign * pose.position[axis]);
+        sign * values.fold(f32::NEG_INFINITY, |most, value| if value > most { value } else { most })
+    };
+    if poses().next().is_none() {
+        return ([-1.0; 3], [1.0; 3]);
+    }
+    ([0, 1, 2].map(|axis| most(axis, -1.0)), [0, 1, 2].map(|axis| most(axis, 1.0)))
+}
+
+/// The surface that the page draws for a geometry: a box by its size, all others by triangles; and the radii of
+/// the balls inside and around it.
+fn kind(geometry: &Geometry) -> Value {
+    let mesh = Mesh::of(geometry);
+    let places = mesh.positions.iter().zip(&mesh.normals);
+    let inside = places.map(|(position, normal)| dot(*position, *normal));
+    let inside =
+        inside.fold(
+            geometry.bounding_radius(),
+            |least, height| {
+                if height < least { height } else { least }
+            },
+        );
+    let mut kind = json!({ "covering": inside, "around": geometry.bounding_radius() });
+    if let Geometry::Box { half_extents } = geometry {
+        kind["box"] = json!(half_extents);
+    } else {
+        kind["positions"] = json!(mesh.positions.concat());
+        kind["normals"] = json!(mesh.normals.concat());
+        kind["triangles"] = json!(mesh.triangles().flatten().collect::<Vec<_>>());
+    }
+    kind
+}
+
+/// Text as the content of an element.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// The template with each `{{name}}` replaced; values are not searched for further names.
+fn filled(template: &str, values: &[(&str, &str)]) -> String {
+    let mut text = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        text.push_str(before);
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        let value = values.iter().find(|(known, _)| *known == name);
+        text.push_str(value.map_or("", |(_, value)| value));
+        rest = after;
+    }
+    text.push_str(rest);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::fixture;
+
+    fn page_of_six() -> Page {
+        let facts = [("board", "emulated <&>".to_owned())];
+        page(&fixture(6), "18 bodies </title>", &facts)
+    }
+
+    #[test]
+    fn the_page_stands_alone_and_keeps_its_facts_as_text() {
+        let Page { html, error } = page_of_six();
+        assert!(html.contains("<title>18 bodies &lt;/title&gt;</title>"));
+        assert!(html.contains("<dt>board</dt><dd>emulated &lt;&amp;&gt;</dd>"));
+        assert!(html.contains(&format!("6 frames, {}", error.text())), "{}", error.text());
+        for outside in ["http://", "https://", "src=", "import ", "@import", "url("] {
+            assert!(!html.contains(outside), "{outside}");
+        }
+        assert!(!html.contains("{{"), "a place that nothing fills");
+        assert_eq!(html.matches("</script>").count(), 3);
+    }
+
+    #[test]
+    fn the_head_has_a_surface_for_each_kind() {
+        let (Page { html, .. }, recording) = (page_of_six(), fixture(6));
+        let (_, head) = html.split_once("id=\"head\">").expect("the head");
+        let (head, _) = head.split_once("</script>").expect("its end");
+        let head: Value = serde_json::from_str(head).expect("JSON");
+        assert_eq!(head["bodies"], 18);
+        assert_eq!(head["times"].as_array().map(Vec::len), Some(6));
+        let kinds = head["kinds"].as_array().expect("kinds");
+        for (kind, geometry) in kinds.iter().zip(recording.geometries()) {
+            let number = |name: &str| kind[name].as_f64().expect("a number");
+            assert!(number("covering") > 0.0 && number("covering") <= number("around") + 1e-6);
+            if let Geometry::Capsule { radius, .. } = geometry {
+                assert!((number("covering") - f64::from(*radius)).abs() < 1e-6);
+            }
+            let length = |name: &str| kind[name].as_array().map(Vec::len);
+            match length("box") {
+                Some(axes) => assert_eq!(axes, 3),
+                None => {
+                    assert_eq!(length("positions"), length("normals"));
+                    let corners = length("positions").expect("positions") / 3;
+                    let triangles = kind["triangles"].as_array().expect("triangles");
+                    assert!(triangles.iter().all(|corner| corner.as_u64() < Some(corners as u64)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,247 @@
+// Plays the recording: time, controls, keys, mouse and touch.
+
+const element = id => document.getElementById(id);
+
+// A software renderer is as fast as it has few pixels: below this the picture gets coarser.
+const PICTURES_WANTED = 33;
+const COARSEST = 0.4;
+const END_SHOWN = 1; // Seconds that the last frame stays.
+
+class Player {
+	constructor(recording) {
+		const { head } = recording;
+		this.recording = recording;
+		this.between = new Between(recording);
+		this.colouring = new Colouring(recording);
+		this.canvas = element("picture");
+		this.painter = new Painter(this.canvas, head, recording.kinds);
+		this.camera = new Camera(head.view.low, head.view.high);
+		this.end = recording.times[recording.times.length - 1];
+		this.time = 0;
+		this.resolution = 1;
+		this.pictures = 0;
+		this.playing = false;
+		element("scrub").max = this.end;
+		element("scrub").step = this.end > 0 ? this.end / 2000 : 1;
+		this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+		this.setColour("speed");
+		this.listen();
+		this.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+		requestAnimationFrame(now => this.picture(now));
+	}
+
+	setTheme(theme) {
+		this.theme = theme;
+		document.documentElement.dataset.theme = theme;
+		this.dirty = true;
+	}
+
+	setColour(name) {
+		this.colour = name;
+		element("colour").value = name;
+		const colours = ramp(name);
+		const [title, low, high] = this.colouring.legend(name);
+		element("legend-title").textContent = title;
+		element("legend-low").textContent = low;
+		element("legend-high").textContent = high;
+		const pen = element("legend-ramp").getContext("2d");
+		for (let x = 0; x < 160; x++) {
+			const at = 4 * Math.round(x / 159 * 255);
+			pen.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
+			pen.fillRect(x, 0, 1, 10);
+		}
+		this.dirty = true;
+	}
+
+	setPlaying(playing) {
+		if (playing && this.time >= this.end) this.setTime(0);
+		this.atEnd = 0;
+		this.playing = playing && this.end > 0;
+		element("play").textContent = this.playing ? "Pause" : "Play";
+		this.measured = null;
+		this.dirty = true;
+	}
+
+	setTime(time) {
+		this.time = Math.min(Math.max(time, 0), this.end);
+		this.dirty = true;
+	}
+
+	// Goes to the frame before or behind the time.
+	stepFrames(count) {
+		const { times } = this.recording;
+		this.setPlaying(false);
+		const reached = times.findLastIndex(time => time <= this.time + 1e-6);
+		this.setTime(times[Math.min(Math.max(reached + count, 0), times.length - 1)]);
+	}
+
+	// One picture of the browser's rhythm.
+	picture(now) {
+		requestAnimationFrame(later => this.picture(later));
+		const passed = Math.min(now - (this.last ?? now), 200) / 1000;
+		this.last = now;
+		if (this.playing) {
+			this.advance(passed);
+			this.measure(now);
+		}
+		this.resize();
+		if (this.dirty) this.draw();
+	}
+
+	// Plays on, and from the beginning after a look at the end.
+	advance(passed) {
+		this.atEnd = this.time < this.end ? 0 : this.atEnd + passed;
+		if (this.atEnd > END_SHOWN) this.setTime(0);
+		else this.setTime(this.time + passed * Number(element("rate").value));
+	}
+
+	draw() {
+		this.dirty = false;
+		const moment = this.between.at(this.time);
+		const colours = this.colouring.at(this.colour, moment);
+		this.painter.draw(moment.poses, colours, this.camera, THEMES[this.theme]);
+		this.pictures++;
+		if (document.activeElement !== element("scrub") || this.playing) element("scrub").value = this.time;
+		element("time").value = `${this.time.toFixed(2)} of ${this.end.toFixed(2)} s`;
+	}
+
+	// Measures pictures a second, and adapts the number of pixels to them.
+	measure(now) {
+		if (!this.measured) {
+			this.measured = { since: now, pictures: this.pictures };
+			return;
+		}
+		const seconds = (now - this.measured.since) / 1000;
+		if (seconds < 0.5) return;
+		const rate = (this.pictures - this.measured.pictures) / seconds;
+		this.measured = { since: now, pictures: this.pictures };
+		if (rate < PICTURES_WANTED && this.resolution > COARSEST) {
+			this.resolution = Math.max(COARSEST, this.resolution * 0.8);
+		}
+		const pixels = this.resolution < 1 ? `, ${Math.round(100 * this.resolution)} % of the pixels' rows` : "";
+		element("rhythm").value = `${rate.toFixed(0)} pictures/s${pixels}`;
+	}
+
+	resize() {
+		const scale = this.resolution * Math.min(devicePixelRatio, 2);
+		const width = Math.max(Math.round(this.canvas.clientWidth * scale), 1);
+		const height = Math.max(Math.round(this.canvas.clientHeight * scale), 1);
+		if (this.canvas.width === width && this.canvas.height === height) return;
+		this.canvas.width = width;
+		this.canvas.height = height;
+		this.dirty = true;
+	}
+
+	screenshot() {
+		// The picture is there only until the browser shows it.
+		this.draw();
+		this.canvas.toBlob(blob => {
+			const link = document.createElement("a");
+			link.href = URL.createObjectURL(blob);
+			link.download = `zynq-pgs-${this.time.toFixed(2)}s.png`;
+			link.click();
+			URL.revokeObjectURL(link.href);
+		});
+	}
+
+	act(key) {
+		const colours = element("colour");
+		const actions = {
+			" ": () => this.setPlaying(!this.playing),
+			",": () => this.stepFrames(-1),
+			".": () => this.stepFrames(1),
+			Home: () => this.setTime(0),
+			End: () => this.setTime(this.end),
+			"+": () => this.camera.zoom(1 / 1.2),
+			"=": () => this.camera.zoom(1 / 1.2),
+			"-": () => this.camera.zoom(1.2),
+			0: () => this.camera.reset(),
+			c: () => this.setColour(colours.options[(colours.selectedIndex + 1) % colours.options.length].value),
+			s: () => this.screenshot(),
+			t: () => this.setTheme(this.theme === "dark" ? "light" : "dark"),
+		};
+		const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+		const focus = document.activeElement;
+		if (turns[key] && (focus === this.canvas || focus === document.body)) this.camera.turn(...turns[key]);
+		else if (actions[key]) actions[key]();
+		else return false;
+		this.dirty = true;
+		return true;
+	}
+
+	listen() {
+		element("controls").addEventListener("submit", event => event.preventDefault());
+		element("play").addEventListener("click", () => this.setPlaying(!this.playing));
+		element("scrub").addEventListener("input", event => {
+			this.setPlaying(false);
+			this.setTime(Number(event.target.value));
+		});
+		element("colour").addEventListener("change", event => this.setColour(event.target.value));
+		element("screenshot").addEventListener("click", () => this.screenshot());
+		element("theme").addEventListener("click", () => this.act("t"));
+		addEventListener("keydown", event => {
+			if (event.ctrlKey || event.metaKey || event.altKey) return;
+			// Controls keep the keys that they use themselves.
+			const focus = event.target.tagName;
+			if (focus === "SELECT" || (["BUTTON", "SUMMARY"].includes(focus) && event.key === " ")) return;
+			if (focus === "INPUT" && /^(Arrow|Home|End)/.test(event.key)) return;
+			const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+			if (this.act(key)) event.preventDefault();
+		});
+		this.listenToPointers();
+	}
+
+	listenToPointers() {
+		const canvas = this.canvas;
+		const pointers = new Map();
+		const middle = () => {
+			const all = [...pointers.values()];
+			const x = all.reduce((sum, at) => sum + at.x, 0) / all.length;
+			const y = all.reduce((sum, at) => sum + at.y, 0) / all.length;
+			return { x, y, spread: Math.hypot(all[0].x - x, all[0].y - y) };
+		};
+		canvas.addEventListener("pointerdown", event => {
+			canvas.setPointerCapture(event.pointerId);
+			pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+			canvas.focus();
+		});
+		canvas.addEventListener("pointermove", event => {
+			if (!pointers.has(event.pointerId)) return;
+			const before = middle();
+			pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+			const after = middle();
+			const height = canvas.clientHeight;
+			const [x, y] = [(after.x - before.x) / height, (after.y - before.y) / height];
+			if (pointers.size > 1 || event.buttons === 2 || event.shiftKey) this.camera.move(x, y);
+			else this.camera.turn(-4 * x, 4 * y);
+			if (pointers.size > 1 && after.spread > 0) this.camera.zoom(before.spread / after.spread);
+			this.dirty = true;
+		});
+		for (const name of ["pointerup", "pointercancel"]) {
+			canvas.addEventListener(name, event => pointers.delete(event.pointerId));
+		}
+		canvas.addEventListener("contextmenu", event => event.preventDefault());
+		canvas.addEventListener("wheel", event => {
+			event.preventDefault();
+			this.camera.zoom(Math.exp(0.001 * event.deltaY));
+			this.dirty = true;
+		}, { passive: false });
+	}
+}
+
+async function begin() {
+	const message = element("message");
+	message.hidden = false;
+	message.textContent = "Reading the poses ...";
+	try {
+		const head = JSON.parse(element("head").textContent);
+		const recording = new Recording(head, await inflate(bytesOfBase64(element("poses").textContent)));
+		window.player = new Player(recording);
+		message.hidden = true;
+	} catch (error) {
+		message.textContent = `This page cannot play: ${error.message}.`;
+		console.error(error);
+	}
+}
+
+begin();

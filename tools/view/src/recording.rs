@@ -1,0 +1,166 @@
+//! Keeps the poses of the moving bodies at some steps of a run.
+
+use scene::Geometry;
+use thiserror::Error;
+use zynq_pgs::{Body, Pose};
+
+/// A file's format cannot hold a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "expected at most {most} bytes in {what}, found {found}: record fewer frames, or fewer bodies"
+)]
+pub struct TooLarge {
+    /// The part of the file.
+    pub what: &'static str,
+    /// Its size in bytes.
+    pub found: u64,
+    /// The largest size that the format holds.
+    pub most: u64,
+}
+
+impl TooLarge {
+    /// Refuses a size beyond 32 bits.
+    pub(crate) fn check(what: &'static str, found: u64) -> Result<u32, Self> {
+        let most = u64::from(u32::MAX);
+        u32::try_from(found).map_err(|_| Self { what, found, most })
+    }
+}
+
+/// The poses after one step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// The number of steps taken before; 0 is the start.
+    pub step: u32,
+    /// The simulated time, s.
+    pub time: f32,
+    /// The pose of each moving body.
+    pub poses: Vec<Pose>,
+}
+
+/// The poses of the moving bodies at some steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// The index of each moving body in the scene.
+    bodies: Vec<usize>,
+    /// The different geometries.
+    geometries: Vec<Geometry>,
+    /// The index of each moving body's geometry.
+    kinds: Vec<usize>,
+    frames: Vec<Frame>,
+}
+
+impl Recording {
+    /// Begins a recording of the bodies that have a geometry; `geometries` has one for each shape.
+    #[must_use]
+    pub fn new(bodies: &[Body], geometries: &[Option<Geometry>]) -> Self {
+        let mut recording =
+            Self { bodies: vec![], geometries: vec![], kinds: vec![], frames: vec![] };
+        for (index, body) in bodies.iter().enumerate() {
+            let shape = usize::try_from(body.shape).ok();
+            let Some(Some(geometry)) = shape.and_then(|shape| geometries.get(shape)) else {
+                continue;
+            };
+            let known = recording.geometries.iter().position(|known| known == geometry);
+            let kind = known.unwrap_or_else(|| {
+                recording.geometries.push(*geometry);
+                recording.geometries.len() - 1
+            });
+            recording.bodies.push(index);
+            recording.kinds.push(kind);
+        }
+        recording
+    }
+
+    /// Adds a frame after `step` steps; does nothing if the last frame is that one.
+    ///
+    /// # Panics
+    /// If `bodies` are fewer than at the beginning.
+    pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) {
+        if self.frames.last().is_some_and(|frame| frame.step == step) {
+            return;
+        }
+        let poses = self.bodies.iter().map(|index| bodies[*index].pose).collect();
+        self.frames.push(Frame { step, time, poses });
+    }
+
+    /// The number of moving bodies.
+    #[must_use]
+    pub fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// The different geometries of the bodies.
+    #[must_use]
+    pub fn geometries(&self) -> &[Geometry] {
+        &self.geometries
+    }
+
+    /// The index of each body's geometry.
+    #[must_use]
+    pub fn kinds(&self) -> &[usize] {
+        &self.kinds
+    }
+
+    /// The frames, in the order of time.
+    #[must_use]
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+}
+
+/// A small recording for tests: cubes that fall and turn.
+#[cfg(test)]
+pub(crate) fn fixture(frames: u32) -> Recording {
+    use scene::{Scene, ShapesOptions};
+    let grid = "3x2x3".parse().expect("a grid");
+    let mut scene = Scene::of_shapes(&ShapesOptions { grid, drop: 1.0, seed: 4 }).expect("a scene");
+    let mut recording = Recording::new(scene.bodies(), scene.geometries());
+    for step in 0..frames {
+        let time = 0.1 * f32::from(u16::try_from(step).expect("few"));
+        recording.add(step, time, scene.bodies());
+        for (index, body) in scene.bodies_mut()[1..].iter_mut().enumerate() {
+            if index > 2 {
+                let Pose { position, orientation } = &mut body.pose;
+                position[1] -= 0.5 * time;
+                position[0] += 0.01 * f32::from(u16::try_from(index).expect("few"));
+                // A turn about x by 2 atan(0.1).
+                let [x, y, z, w] = *orientation;
+                let turned = [x + 0.1 * w, y - 0.1 * z, z + 0.1 * y, w - 0.1 * x];
+                *orientation = turned.map(|value| value / 1.01_f32.sqrt());
+            }
+        }
+    }
+    recording
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ground_is_left_out_and_equal_geometries_are_one() {
+        let recording = fixture(3);
+        assert_eq!(recording.bodies(), 18);
+        let names: Vec<_> = recording.geometries().iter().map(Geometry::name).collect();
+        let mut once = names.clone();
+        once.sort_unstable();
+        once.dedup();
+        assert_eq!(names.len(), once.len(), "{names:?}");
+        assert!(recording.kinds().iter().all(|kind| *kind < names.len()));
+    }
+
+    #[test]
+    fn a_step_is_recorded_once() {
+        let mut recording = fixture(3);
+        assert_eq!(recording.frames().len(), 3);
+        recording.add(2, 0.2, &[]);
+        assert_eq!(recording.frames().len(), 3);
+    }
+
+    #[test]
+    fn a_size_beyond_32_bits_is_refused_with_a_way_out() {
+        assert_eq!(TooLarge::check("a part", 7), Ok(7));
+        let said = TooLarge::check("a part", 1 << 32).expect_err("too large").to_string();
+        assert!(said.contains("a part, found 4294967296: record fewer frames"), "{said}");
+    }
+}
