@@ -68,12 +68,20 @@ impl Step {
         })
     }
 
-    /// The command that measures this step with another verb, whose option for the number of a step
-    /// is `step`.
-    pub(super) fn command(&self, verb: &str, step: &str) -> String {
+    /// The command by which `pgs formats` measures this step.
+    pub(super) fn formats_command(&self) -> String {
+        self.command("pgs formats", |step| format!("--step {step}"))
+    }
+
+    /// The command by which `pgs order` measures this step; it counts the steps before.
+    pub(super) fn order_command(&self) -> String {
+        self.command("pgs order", |step| format!("--drop 1 --steps {}", step.saturating_sub(1)))
+    }
+
+    fn command(&self, verb: &str, step: impl Fn(u32) -> String) -> String {
         match &self.options {
             Options::Folder(path) => format!("{verb} --input {path}"),
-            Options::Pile { grid, steps } => format!("{verb} --grid {grid} {step} {steps}"),
+            Options::Pile { grid, steps } => format!("{verb} --grid {grid} {}", step(*steps)),
         }
     }
 }

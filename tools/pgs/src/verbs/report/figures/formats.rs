@@ -110,7 +110,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
             format!("{:.3} % of the numbers that are not 0.", loss.under_share() * 100.0),
         )?,
     ];
-    let command = step.command("pgs formats", "--step");
+    let command = step.formats_command();
     let row = |thesis: &str, subject: &str, recorded: &str, ours, shown: &str| Row {
         thesis: thesis.to_owned(),
         subject: subject.to_owned(),

@@ -83,7 +83,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         recorded: "1,528 of 38,880 (3.85 %; 1,528 / 38,880 is 3.93 %)".to_owned(),
         ours: ours.join("; "),
         origin: Origin::Measured,
-        command: step.command("pgs order", "--drop 1 --steps"),
+        command: step.order_command(),
         shown: figure.id.to_owned(),
     };
     Ok(Part { figures: vec![figure], rows: vec![row] })

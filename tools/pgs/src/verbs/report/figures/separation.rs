@@ -138,7 +138,7 @@ pub(crate) fn part() -> Part {
             gaps[0], gaps[1]
         ),
         origin: Origin::Modelled,
-        command: "pgs report".to_owned(),
+        command: "pgs report --out report".to_owned(),
         shown: figure.id.to_owned(),
     };
     Part { figures: vec![figure], rows: vec![row] }
