@@ -12,8 +12,9 @@ use step_trace::TracedStep;
 use zynq_pgs::{BoardKind, StepReport};
 
 use crate::board::OpenBoard;
-use crate::failure::Failure;
+use crate::failure::{Cause, Failure};
 use crate::options::build::described;
+use crate::output::files::check_folder;
 
 /// The files that show the inside of a step.
 #[derive(Debug, Clone, Default, Args)]
@@ -52,6 +53,7 @@ impl TracedArgs {
     /// The board to record, if a step is to be recorded. A board outside this process has no recorder.
     pub(crate) fn tracing(&self, opened: &OpenBoard) -> Result<Option<Tracing<'_>>, Failure> {
         let Some((name, _)) = self.given().next() else { return Ok(None) };
+        self.given().try_for_each(|(_, path)| check_folder(path))?;
         if let Some(board) = &opened.observer {
             return Ok(Some(Tracing { args: self, board: board.clone() }));
         }
@@ -118,7 +120,8 @@ impl Tracing<'_> {
             })
         });
         written.and_then(|()| files.commit()).map_err(|error| {
-            Failure::input(error).next("make room, or name another file; no file has changed")
+            Failure::new(Cause::Output, error)
+                .next("make room, or name another file; no file has changed")
         })
     }
 }

@@ -16,7 +16,7 @@ use crate::numbers::grouped;
 pub(crate) const CONTACT_REACH: f32 = 0.05;
 
 /// Default drop, m: the pile lands within half a second.
-const DROP: f32 = 1.0;
+pub(crate) const DROP: f32 = 1.0;
 
 /// The scene and its size.
 #[derive(Debug, Clone, Args)]

@@ -1,6 +1,7 @@
 //! Writes results: facts and tables for people, JSON documents for programs.
 
 pub(crate) mod facts;
+pub(crate) mod files;
 pub(crate) mod order;
 pub(crate) mod progress;
 pub(crate) mod table;

@@ -12,9 +12,12 @@ pub(crate) const HWMON: &str = "/sys/class/hwmon";
 const PREFIX: &str = "ina226";
 /// Shortest time between two samples, whatever a sensor says.
 const INTERVAL_MIN: Duration = Duration::from_millis(10);
+/// Longest time between two samples: a sensor's own time is not trusted beyond it.
+const INTERVAL_MAX: Duration = Duration::from_millis(100);
 /// Time between two samples of sensors that do not say it.
 const INTERVAL: Duration = Duration::from_millis(35);
-/// Largest error of the gain of an INA226's shunt and bus voltages, each (data sheet SBOS547): 0.1 %.
+/// Largest gain error of the power: 0.1 % of the shunt voltage and 0.1 % of the bus voltage (data sheet
+/// SBOS547).
 pub(super) const GAIN_ERROR: f64 = 0.002;
 
 /// The part of the chip that a rail supplies.
@@ -144,7 +147,7 @@ impl Sensors {
         }
         sensors.sort_by_key(|sensor| RAILS.iter().position(|(_, rail, _)| *rail == sensor.rail));
         let logic = sensors.iter().any(|sensor| sensor.domain == Domain::Logic);
-        let interval = interval.unwrap_or(INTERVAL).max(INTERVAL_MIN);
+        let interval = interval.unwrap_or(INTERVAL).clamp(INTERVAL_MIN, INTERVAL_MAX);
         logic.then_some(Self { sensors, interval })
     }
 

@@ -180,9 +180,9 @@ pub(crate) fn run(
                 // The same refusal names the place in the folder.
                 match stepped {
                     Err(error) if error.is_input() => {
-                        let folders = &folder.collisions;
+                        let as_given = &folder.collisions;
                         Err(accelerator
-                            .step(&mut bodies, folders, &parameters)
+                            .step(&mut bodies, as_given, &parameters)
                             .err()
                             .unwrap_or(error))
                     }
@@ -191,9 +191,7 @@ pub(crate) fn run(
             }
         }
     });
-    if let Some(tracing) = &tracing {
-        tracing.end(stepped.as_ref().ok())?;
-    }
+    let traced = tracing.as_ref().map(|tracing| tracing.end(stepped.as_ref().ok()));
     if stepped.is_ok() {
         opened.alive()?;
     }
@@ -206,6 +204,8 @@ pub(crate) fn run(
         }
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
+    // A step that failed is told before a file that cannot be written.
+    traced.transpose()?;
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(|error| {
             Failure::input(error).next(format!(

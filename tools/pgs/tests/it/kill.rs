@@ -12,7 +12,7 @@ use std::time::Instant;
 use crate::common::{Tied, pgs, signal, variable};
 
 /// Default number of kills.
-const KILLS: u32 = 20;
+const KILLS: u32 = 8;
 /// Seed of the moments.
 const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 

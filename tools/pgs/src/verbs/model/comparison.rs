@@ -62,19 +62,19 @@ fn platforms() -> Table {
 }
 
 /// The figures that follow from one latency.
-struct Outcome {
-    ms: f64,
+pub(crate) struct Outcome {
+    pub(crate) ms: f64,
 }
 
 impl Outcome {
     fn joules(&self) -> f64 {
         ZCU102_WATTS * self.ms / 1e3
     }
-    fn speedup(&self, platform: &Platform) -> f64 {
+    pub(crate) fn speedup(&self, platform: &Platform) -> f64 {
         platform.latency_ms / self.ms
     }
     /// Computes with both energies unrounded, not with the printed ones.
-    fn energy(&self, platform: &Platform) -> f64 {
+    pub(crate) fn energy(&self, platform: &Platform) -> f64 {
         platform.watts * platform.latency_ms / 1e3 / self.joules()
     }
     fn whole_step(&self) -> f64 {

@@ -2,7 +2,7 @@
 //! without running anything.
 
 mod beyond;
-mod comparison;
+pub(crate) mod comparison;
 mod data;
 mod estimate;
 mod euler;

@@ -80,7 +80,7 @@ impl<'a> Axis<'a> {
         match size {
             _ if self.scale == Scale::Log && (place - place.round()).abs() > 1e-6 => String::new(),
             _ if size == 0.0 => "0".to_owned(),
-            _ if size >= 1e6 || size < 1e-3 => format!("{value:.0e}"),
+            _ if !(1e-3..1e6).contains(&size) => format!("{value:.0e}"),
             _ if size >= 10.0 => format!("{value:.0}"),
             _ => {
                 let text = format!("{value:.3}");

@@ -38,7 +38,9 @@ impl Origin {
     pub(super) const fn meaning(self) -> &'static str {
         match self {
             Self::Modelled => "counted, or computed by a formula",
-            Self::Measured => "measured in steps on the emulated board",
+            Self::Measured => {
+                "measured on this machine: steps of the emulated board, or the host's time"
+            }
             Self::Recorded => "a figure that the thesis prints",
         }
     }

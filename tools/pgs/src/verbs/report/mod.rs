@@ -32,6 +32,8 @@ use scene::Grid;
 
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
+#[cfg(feature = "report")]
+use crate::interrupt::Interrupt;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -58,12 +60,21 @@ pub(crate) struct ReportArgs {
     /// Fewer seeds and steps: about a minute instead of ten.
     #[arg(long)]
     quick: bool,
-    /// Cubes of our own pile along each axis.
-    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
-    grid: Grid,
+    /// Cubes of our own pile along each axis [default: 36x30x36; smaller ones for long studies with
+    /// --quick]
+    #[arg(long, value_name = "NXxNYxNZ")]
+    grid: Option<Grid>,
     /// Step of our own pile that is measured; the steps before it are taken first.
     #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
     step: u32,
+}
+
+#[cfg(feature = "report")]
+impl ReportArgs {
+    /// The pile whose step is measured.
+    fn pile(&self) -> Grid {
+        self.grid.unwrap_or_default()
+    }
 }
 
 /// Measures, draws and writes.
@@ -73,7 +84,14 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let report = parts::gather(args, common)?;
+    let interrupt = Interrupt::install();
+    let report = match parts::gather(args, common, &interrupt) {
+        Err(_) if interrupt.is_set() => {
+            log::warn!("interrupted: no report was written");
+            return Ok(Verdict::Interrupted);
+        }
+        gathered => gathered?,
+    };
     let files = write::write(&args.out, &report)?;
     if common.json {
         writeln!(out, "{:#}", text::json(&report))?;
@@ -93,7 +111,7 @@ pub(crate) fn run(
     _: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     let ReportArgs { out, input, quick, grid, step } = args;
-    log::debug!("not built: report --out {out:?}, {input:?}, quick {quick}, {grid}, step {step}");
+    log::debug!("not built: report --out {out:?}, {input:?}, quick {quick}, {grid:?}, step {step}");
     Err(Failure::input("this pgs was built without the report's charts").next(
         "build it with them: cargo run --release -p pgs --features report -- report --out DIR",
     ))

@@ -1,5 +1,7 @@
 //! Gathers the parts of the report, with progress.
 
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::ReportArgs;
@@ -10,9 +12,13 @@ use super::studies::Effort;
 use super::tables;
 use crate::common::{BoardName, CommonArgs};
 use crate::failure::Failure;
+use crate::interrupt::Interrupt;
 use crate::verbs::model::table::Table;
 use crate::verbs::model::thesis_tables;
 use crate::verbs::study::Session;
+
+/// Time between two pictures of the spinner.
+const TICK: Duration = Duration::from_millis(200);
 
 /// Everything that the report shows.
 #[derive(Debug)]
@@ -27,52 +33,102 @@ pub(super) struct Report {
 }
 
 /// Measures and draws all parts.
-pub(super) fn gather(args: &ReportArgs, common: &CommonArgs) -> Result<Report, Failure> {
+pub(super) fn gather(
+    args: &ReportArgs,
+    common: &CommonArgs,
+    interrupt: &Interrupt,
+) -> Result<Report, Failure> {
+    if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
+        return Err(Failure::input("the report measures the emulated board")
+            .next("leave out --board, and PGS_BOARD"));
+    }
+    let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
     let bar = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
     }
-    // The report measures the emulated board, also on a machine that has a real one.
-    let mut common = common.clone();
-    if common.board == BoardName::Auto {
-        common.board = BoardName::Emulated;
-    }
-    let common = &common;
+    bar.enable_steady_tick(TICK);
+    let session = Session::within(&common, interrupt.clone(), bar.clone());
+    let gathered = of_all(args, &common, &session, &bar);
+    bar.finish_and_clear();
+    gathered
+}
+
+fn of_all(
+    args: &ReportArgs,
+    common: &CommonArgs,
+    session: &Session,
+    bar: &ProgressBar,
+) -> Result<Report, Failure> {
+    let effort = Effort::new(args, session);
     let about = |what: &'static str| {
         bar.set_message(what);
-        bar.tick();
+        effort.go_on()
     };
-    about("the step to measure");
+    about("the step to measure")?;
     let step = match &args.input {
         Some(path) => Step::folder(path)?,
-        None => Step::of_pile(args, common, || bar.tick())?,
+        None => Step::of_pile(args, common, &effort)?,
     };
-    let session = Session::new(common);
-    let effort = Effort::new(args, &session);
     // In the order of the thesis.
-    about("time steps");
+    about("time steps")?;
     let mut part = figures::time_step::part(&effort)?;
     part.append(figures::euler::part()?);
     part.append(figures::separation::part());
-    about("stopping rules and shares of a step");
+    about("stopping rules and shares of a step")?;
     part.append(figures::solver::part(&effort)?);
-    about("the pile");
+    about("the pile")?;
     part.append(figures::pile::part(&effort, common)?);
     let tables = thesis_tables();
     part.rows.extend(tables::of_chapter_4(&tables)?);
-    about("orders of the collisions");
+    about("orders of the collisions")?;
     part.append(figures::orders::part(&effort)?);
-    about("the input in 16 bits");
+    about("the input in 16 bits")?;
     part.append(figures::formats::part(&step)?);
-    about("16 bits against float");
+    about("16 bits against float")?;
     part.append(figures::half::part(&effort)?);
-    about("live bodies of each order");
+    about("live bodies of each order")?;
     part.append(figures::live::part(&step)?);
-    about("stages of a step");
+    about("stages of a step")?;
     part.append(figures::stages::part(common)?);
     part.append(figures::ladder::part()?);
     part.append(figures::designs::part()?);
     part.rows.extend(tables::of_chapter_6(&tables)?);
-    bar.finish_and_clear();
     Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part, tables })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli;
+    use crate::verbs::Verb;
+
+    fn parsed(command: &str) -> cli::Command {
+        let found = cli::parse(command.split_whitespace(), |_| None);
+        found.unwrap_or_else(|error| panic!("{command}: {error}"))
+    }
+
+    /// On a pile of our own; a folder's path changes one option of the commands.
+    #[test]
+    fn every_row_of_the_index_has_a_command_and_leads_to_a_figure_or_a_table() {
+        let command = parsed("pgs report --out unused --quick --grid 3x3x3 --step 35");
+        let Verb::Report(args) = &command.verb else { panic!("{command:?}") };
+        let report = gather(args, &command.common, &Interrupt::install()).expect("a report");
+        let anchors: Vec<String> = (report.part.figures.iter().map(|figure| figure.id.to_owned()))
+            .chain(report.tables.iter().map(tables::anchor))
+            .collect();
+        for row in &report.part.rows {
+            parsed(&row.command);
+            assert!(anchors.contains(&row.shown), "{row:?}");
+            let cells = [&row.thesis, &row.subject, &row.recorded, &row.ours];
+            assert!(cells.iter().all(|cell| !cell.is_empty()), "{row:?}");
+        }
+        let ours = |figure: &str| report.part.rows.iter().filter(|row| row.shown == figure).count();
+        for figure in &report.part.figures {
+            assert!(ours(figure.id) > 0 || SIBLINGS.contains(&figure.id), "{}", figure.id);
+        }
+    }
+
+    /// Figures whose numbers stand in the row of the figure before.
+    const SIBLINGS: [&str; 1] = ["figure-4-6"];
 }

@@ -6,17 +6,22 @@ use scene::{Scene, SceneOptions};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::ReportArgs;
+use super::studies::{Effort, quoted};
 use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
+use crate::options::scenes::DROP;
 use crate::step_input;
 use step_folder::folder::Folder;
 use zynq_pgs::emulation::Build;
 
+/// Depth of the pipeline at which orders are compared, issue slots.
+pub(super) const DEPTH: u32 = 64;
+
 /// The input of a step.
 #[derive(Debug)]
 pub(super) struct Step {
-    /// The step for people: "the step in vectors/full_step186".
+    /// The step for people, such as "the step in `vectors/full_step186`".
     pub(super) name: String,
     /// Options of other verbs that take the same step.
     options: Options,
@@ -39,14 +44,13 @@ impl Step {
         Ok(Self { name, options: Options::Folder(shown), bodies, shapes, collisions })
     }
 
-    /// A step of our own pile, after the steps before it on the emulated board; calls `taken` after
-    /// each of them.
+    /// A step of our own pile, after the steps before it on the emulated board.
     pub(super) fn of_pile(
         args: &ReportArgs,
         common: &CommonArgs,
-        mut taken: impl FnMut(),
+        effort: &Effort<'_>,
     ) -> Result<Self, Failure> {
-        let options = SceneOptions { grid: args.grid, ..SceneOptions::default() };
+        let options = SceneOptions { grid: args.pile(), drop: DROP, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let mut opened = board::open(common, &Build::default())?;
         opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
@@ -56,12 +60,12 @@ impl Step {
             let (bodies, collisions) = scene.parts_mut();
             let stepped = opened.accelerator.step(bodies, collisions, &parameters);
             stepped.map_err(|error| opened.failure(error))?;
-            taken();
+            effort.go_on()?;
         }
         scene.detect();
         Ok(Self {
-            name: format!("step {} of our pile of {} cubes", args.step, args.grid),
-            options: Options::Pile { grid: args.grid.to_string(), steps: args.step },
+            name: format!("step {} of our pile of {} cubes", args.step, args.pile()),
+            options: Options::Pile { grid: args.pile().to_string(), steps: args.step },
             bodies: scene.bodies().to_vec(),
             shapes: scene.shapes().to_vec(),
             collisions: scene.collisions().to_vec(),
@@ -75,12 +79,15 @@ impl Step {
 
     /// The command by which `pgs order` measures this step; it counts the steps before.
     pub(super) fn order_command(&self) -> String {
-        self.command("pgs order", |step| format!("--drop 1 --steps {}", step.saturating_sub(1)))
+        let command = self.command("pgs order", |step| {
+            format!("--drop {DROP} --steps {}", step.saturating_sub(1))
+        });
+        format!("{command} --depth {DEPTH}")
     }
 
     fn command(&self, verb: &str, step: impl Fn(u32) -> String) -> String {
         match &self.options {
-            Options::Folder(path) => format!("{verb} --input {path}"),
+            Options::Folder(path) => format!("{verb} --input {}", quoted(path)),
             Options::Pile { grid, steps } => format!("{verb} --grid {grid} {}", step(*steps)),
         }
     }

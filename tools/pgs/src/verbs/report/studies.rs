@@ -31,10 +31,20 @@ fn options<T: Args>(study: &str, words: &[String]) -> Result<(String, T), Failur
     let matches = T::augment_args(Command::new("study"))
         .try_get_matches_from(std::iter::once(&name).chain(words))
         .and_then(|matches| T::from_arg_matches(&matches));
-    let command = format!("pgs study {study} {}", words.join(" "));
+    let shown: Vec<String> = words.iter().map(|word| quoted(word)).collect();
+    let command = format!("pgs study {study} {}", shown.join(" "));
     let options = matches
         .map_err(|error| Failure::new(Cause::Input, format!("{command} is refused: {error}")))?;
     Ok((command, options))
+}
+
+/// A word as a shell reads it.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "_./=,:+-".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
 }
 
 fn words(text: &str) -> Vec<String> {
@@ -46,9 +56,14 @@ impl<'a> Effort<'a> {
         Self { args, session }
     }
 
+    /// Refuses to go on after Ctrl-C.
+    pub(super) fn go_on(&self) -> Result<(), Failure> {
+        interrupted(!self.session.is_interrupted())
+    }
+
     /// The step of the report: the folder's, or one of our own pile.
     fn one_step(&self) -> (Vec<String>, String) {
-        let ReportArgs { input, grid, step, .. } = self.args;
+        let ReportArgs { input, step, .. } = self.args;
         match input {
             Some(path) => {
                 let path = path.display().to_string();
@@ -56,25 +71,28 @@ impl<'a> Effort<'a> {
                 (vec!["--input".to_owned(), path], subject)
             }
             None => {
-                let from = step.saturating_sub(1);
+                let (grid, from) = (self.args.pile(), step.saturating_sub(1));
                 let words = words(&format!("--grid {grid} --from {from} --steps 1"));
                 (words, format!("step {step} of our pile of {grid} cubes"))
             }
         }
     }
 
+    /// The grid that the user gave; otherwise this small one in a quick report, and the thesis'.
+    fn grid(&self, [x, y, z]: [u16; 3]) -> Grid {
+        let small = || Grid::new(x, y, z).ok().filter(|_| self.args.quick);
+        self.args.grid.or_else(small).unwrap_or_default()
+    }
+
     /// The pile that is shown: a smaller one in a quick report.
     pub(super) fn pile(&self) -> Grid {
-        let small = Grid::new(18, 15, 18).unwrap_or_default();
-        if self.args.quick && self.args.grid == Grid::default() { small } else { self.args.grid }
+        self.grid([18, 15, 18])
     }
 
     /// Many steps of our own pile: a small one in a quick report.
     fn many_steps(&self) -> (Vec<String>, String) {
-        let (grid, steps) = match self.args.quick {
-            true => ("12x12x12".to_owned(), 200),
-            false => (self.args.grid.to_string(), 240),
-        };
+        let grid = self.grid([12, 12, 12]);
+        let steps = if self.args.quick { 200 } else { 240 };
         let words = words(&format!("--grid {grid} --drop 5 --steps {steps}"));
         (words, format!("{steps} steps of our pile of {grid} cubes, dropped from 5 m"))
     }
@@ -141,7 +159,7 @@ impl Effort<'_> {
     }
 
     pub(super) fn split(&self) -> Result<Studied<split::Outcome>, Failure> {
-        let grid = if self.args.quick { "12x12x12".to_owned() } else { self.args.grid.to_string() };
+        let grid = self.grid([12, 12, 12]);
         let (command, options) =
             options::<split::Options>("split", &words(&format!("--grid {grid}")))?;
         let outcome = split::measure(&options, self.session)?;
@@ -151,12 +169,12 @@ impl Effort<'_> {
     }
 }
 
-/// Refuses to go on with half an outcome.
+/// Refuses to go on after Ctrl-C, which leaves an outcome incomplete.
 fn interrupted(complete: bool) -> Result<(), Failure> {
     if complete {
         return Ok(());
     }
-    Err(Failure::new(Cause::Output, "interrupted: no report was written").next("run it again"))
+    Err(Failure::new(Cause::Output, "interrupted: no report was written"))
 }
 
 /// The share of numbers that deviate by less than each edge of a histogram, percent.
@@ -203,5 +221,7 @@ mod tests {
         assert_eq!(command, "pgs study determinism --grid 3x3x3 --steps 2 --pairs 1");
         assert_eq!(parsed.pairs, Some(1));
         assert!(options::<determinism::Options>("determinism", &["--no".to_owned()]).is_err());
+        assert_eq!(quoted("../a/step_1"), "../a/step_1");
+        assert_eq!(quoted("my step's"), "'my step'\\''s'");
     }
 }

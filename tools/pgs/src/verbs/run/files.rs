@@ -14,6 +14,7 @@ use zynq_pgs_view::{Recording, TooLarge, gltf, npz};
 
 use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
+use crate::output::files::check_folder;
 
 /// Most frames without a choice of the user's, beside the start.
 const FRAMES: u32 = 200;
@@ -32,7 +33,7 @@ pub(crate) struct FileArgs {
     /// Write a picture of the last step.
     #[arg(long, value_name = "FILE.png|svg", value_parser = |text: &str| with_extension(text, &["png", "svg"]))]
     picture: Option<PathBuf>,
-    /// Record every K-th step [default: so many that there are at most 200 frames]
+    /// Record every K-th step [default: the smallest K that gives at most 200 frames]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
     /// Record about N frames beside the start, evenly spread.
@@ -86,25 +87,10 @@ struct Unfit {
     source: TooLarge,
 }
 
-/// The folder of a file is missing.
-#[derive(Debug, Error)]
-#[error("{}: expected a folder to write {} in, found none", folder.display(), name.display())]
-struct NoFolder {
-    folder: PathBuf,
-    name: PathBuf,
-}
-
 impl FileArgs {
     /// Refuses files that could not be written after the run.
     pub(super) fn check(&self) -> Result<(), Failure> {
-        for path in self.paths() {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-                let error = NoFolder { folder: folder.to_owned(), name: path.to_owned() };
-                return Err(Failure::input(error).next("make the folder, or name another file"));
-            }
-        }
-        Ok(())
+        self.paths().try_for_each(check_folder)
     }
 
     fn paths(&self) -> impl Iterator<Item = &Path> {
@@ -187,7 +173,7 @@ pub(super) struct Film {
 }
 
 impl Film {
-    /// Adds the scene after so many steps, if the frame is one of the chosen ones.
+    /// Adds the scene after `step` steps, if its frame is a chosen one.
     pub(super) fn step(&mut self, steps: u32, scene: &Scene) {
         if steps.is_multiple_of(self.every) {
             self.add(steps, scene);

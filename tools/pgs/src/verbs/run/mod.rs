@@ -163,7 +163,7 @@ impl RunArgs {
     fn tracing(&self, opened: &OpenBoard) -> Result<Option<(Tracing<'_>, u32)>, Failure> {
         let (step, steps) = (self.traced_step.unwrap_or(self.steps()), self.steps());
         if self.traced_step.is_some() && !self.traced.is_given() {
-            let error = "--traced-step names a step of which no file is to be written";
+            let error = "--traced-step names a step, and no file to write is named";
             return Err(Failure::input(error).next("add --vcd, --trace or --timeline FILE"));
         }
         if step > steps {
@@ -294,11 +294,13 @@ fn take_steps(
         }
         let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
         let row = step(number, parameters, &mut opened.accelerator, scene, memory, arranger);
-        if let Some(tracing) = tracing {
+        let traced = tracing.map(|tracing| {
             let row = row.as_ref().ok().and_then(Option::as_ref);
-            tracing.end(row.map(|row| &row.report))?;
-        }
+            tracing.end(row.map(|row| &row.report))
+        });
+        // A step that failed is told before a file that cannot be written.
         let row = row.map_err(|error| args.faults.failure(opened, parameters, error))?;
+        traced.transpose()?;
         opened.alive()?;
         let Some(row) = row else { break };
         let mut beside = None;

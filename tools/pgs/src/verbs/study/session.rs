@@ -13,17 +13,21 @@ pub(crate) struct Session {
     pub(crate) common: CommonArgs,
     interrupt: Interrupt,
     bar: ProgressBar,
+    /// The bar is of this session alone.
+    owns_bar: bool,
 }
 
 impl Session {
     /// Takes over Ctrl-C, and shows the progress on a terminal.
     pub(crate) fn new(common: &CommonArgs) -> Self {
-        Self::within(common, Interrupt::install(), progress_bar(0))
+        let (interrupt, bar) = (Interrupt::install(), progress_bar(0));
+        Self { common: common.clone(), interrupt, bar, owns_bar: true }
     }
 
     /// A session in a verb that has taken over Ctrl-C, and shows the progress in `bar`.
+    #[cfg(feature = "report")]
     pub(crate) fn within(common: &CommonArgs, interrupt: Interrupt, bar: ProgressBar) -> Self {
-        Self { common: common.clone(), interrupt, bar }
+        Self { common: common.clone(), interrupt, bar, owns_bar: false }
     }
 
     /// Announces further steps.
@@ -36,12 +40,15 @@ impl Session {
         self.bar.inc(1);
     }
 
-    /// Clears the progress.
+    /// Clears the progress, unless another verb shows it.
     pub(super) fn end(&self) {
-        self.bar.finish_and_clear();
+        if self.owns_bar {
+            self.bar.finish_and_clear();
+        }
     }
 
-    pub(super) fn is_interrupted(&self) -> bool {
+    /// Whether Ctrl-C has come.
+    pub(crate) fn is_interrupted(&self) -> bool {
         self.interrupt.is_set()
     }
 

@@ -1,14 +1,15 @@
 //! Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
 
 use bitstream_model::Bandwidth;
-use bitstream_model::estimate::thesis::recorded::{CPU, Design, GPU, Platform, ZCU102_WATTS};
+use bitstream_model::estimate::thesis::recorded::{CPU, Design, GPU, Platform};
 use bitstream_model::estimate::thesis::{BODIES, COLLISIONS};
 use bitstream_model::estimate::{Records, StepShape, StepTime};
 use bitstream_model::interface::profile::PROFILES;
 
 use super::super::chart::bars;
-use super::super::document::{Figure, Origin, Part};
+use super::super::document::{Figure, Origin, Part, Row};
 use crate::failure::Failure;
+use crate::verbs::model::comparison::Outcome;
 
 /// A design's figure over a machine: the thesis', if it has one, and ours.
 type Beside = (Option<f64>, f64);
@@ -17,7 +18,7 @@ type Beside = (Option<f64>, f64);
 fn beside(
     platform: &Platform,
     recorded: impl Fn(&Design) -> f64,
-    ours: impl Fn(&Platform, f64) -> f64,
+    ours: fn(&Outcome, &Platform) -> f64,
 ) -> Vec<(String, Beside)> {
     let shape = StepShape::new(BODIES, COLLISIONS);
     PROFILES
@@ -26,17 +27,10 @@ fn beside(
             let variant = profile.default_variant();
             let time = StepTime::new(&variant, Records::Packed, &shape, Bandwidth::Unlimited);
             let printed = Design::of(profile).map(&recorded);
-            (profile.name.to_owned(), (printed, ours(platform, time.seconds * 1e3)))
+            let outcome = Outcome { ms: time.seconds * 1e3 };
+            (profile.name.to_owned(), (printed, ours(&outcome, platform)))
         })
         .collect()
-}
-
-fn speedup(platform: &Platform, ms: f64) -> f64 {
-    platform.latency_ms / ms
-}
-
-fn efficiency(platform: &Platform, ms: f64) -> f64 {
-    platform.watts * platform.latency_ms / (ZCU102_WATTS * ms)
 }
 
 fn figure(
@@ -64,14 +58,35 @@ fn figure(
     })
 }
 
+/// The row of a figure: both designs of the thesis.
+fn row(figure: &Figure, over: &[Vec<(String, Beside)>; 2], what: &str) -> Row {
+    let [gpu, cpu] = over;
+    let designs = || gpu.iter().zip(cpu).filter(|((_, (printed, _)), _)| printed.is_some());
+    let printed =
+        |beside: &Beside| beside.0.map_or_else(String::new, |times| format!("{times:.2}"));
+    let recorded = designs()
+        .map(|((name, gpu), (_, cpu))| format!("{name} {} and {}", printed(gpu), printed(cpu)));
+    let ours =
+        designs().map(|((name, gpu), (_, cpu))| format!("{name} {:.2} and {:.2}", gpu.1, cpu.1));
+    Row {
+        thesis: format!("§6.4, §6.5, {}", figure.thesis),
+        subject: format!("{what} over GPU and CPU"),
+        recorded: recorded.collect::<Vec<_>>().join(", "),
+        ours: ours.collect::<Vec<_>>().join(", "),
+        origin: Origin::Modelled,
+        command: "pgs model --section comparison".to_owned(),
+        shown: figure.id.to_owned(),
+    }
+}
+
 pub(crate) fn part() -> Result<Part, Failure> {
     let speed = [
-        beside(&GPU, |design| design.speedup.gpu, speedup),
-        beside(&CPU, |design| design.speedup.cpu, speedup),
+        beside(&GPU, |design| design.speedup.gpu, Outcome::speedup),
+        beside(&CPU, |design| design.speedup.cpu, Outcome::speedup),
     ];
     let energy = [
-        beside(&GPU, |design| design.energy.gpu, efficiency),
-        beside(&CPU, |design| design.energy.cpu, efficiency),
+        beside(&GPU, |design| design.energy.gpu, Outcome::energy),
+        beside(&CPU, |design| design.energy.cpu, Outcome::energy),
     ];
     let figures = vec![
         figure(
@@ -91,7 +106,9 @@ pub(crate) fn part() -> Result<Part, Failure> {
             "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured.",
         )?,
     ];
-    Ok(Part { figures, rows: Vec::new() })
+    let rows = [(&figures[0], &speed, "speed-up"), (&figures[1], &energy, "energy efficiency")]
+        .map(|(figure, over, what)| row(figure, over, what));
+    Ok(Part { rows: rows.to_vec(), figures })
 }
 
 #[cfg(test)]
@@ -102,7 +119,7 @@ mod tests {
     fn the_models_figures_are_near_the_recorded_ones() {
         for (platform, of) in [(&GPU, 0), (&CPU, 1)] {
             let recorded = move |design: &Design| [design.speedup.gpu, design.speedup.cpu][of];
-            for (name, (printed, ours)) in beside(platform, recorded, speedup) {
+            for (name, (printed, ours)) in beside(platform, recorded, Outcome::speedup) {
                 let near = printed.is_none_or(|printed| (ours / printed - 1.0).abs() < 0.02);
                 assert!(near, "{name}: {printed:?} and {ours}");
             }

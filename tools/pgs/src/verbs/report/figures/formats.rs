@@ -10,10 +10,10 @@ use crate::verbs::formats::{EACH_ONCE, Loss, Sizes, numbers};
 
 /// Bins of a decade of magnitudes.
 const PER_DECADE: f64 = 4.0;
-/// Decades below 1 that the charts show.
+/// Powers of ten between which the charts show numbers.
 const LOWEST: i32 = -9;
 const HIGHEST: i32 = 3;
-/// Most dots of a chart.
+/// Most dots of a sample.
 const DOTS: usize = 1500;
 /// The error at which Figure 4.8 cuts, percent.
 const CUT: f64 = 1.0;
@@ -30,6 +30,9 @@ fn distribution<'a>(values: impl Iterator<Item = &'a f32>) -> Vec<(f64, f64)> {
     }
     for value in values.filter(|value| **value != 0.0) {
         let place = (f64::from(value.abs()).log10() - f64::from(LOWEST)) * PER_DECADE;
+        if place < 0.0 {
+            continue;
+        }
         let index = (0..found.len()).zip(1_u32..).find(|(_, end)| place < f64::from(*end));
         if let Some((index, _)) = index {
             found[index].1 += 1.0;
@@ -50,7 +53,7 @@ fn errors(values: &[f32]) -> Vec<(f64, f64)> {
 
 /// As many points as a chart holds, evenly among all.
 fn thinned(points: impl Iterator<Item = (f64, f64)>, count: usize) -> Vec<(f64, f64)> {
-    points.step_by((count / DOTS).max(1)).collect()
+    points.step_by(count.div_ceil(DOTS).max(1)).collect()
 }
 
 pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
@@ -64,16 +67,17 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
     let (x, count) = (Axis::log("magnitude"), Axis::log("numbers"));
     let spread = |id, thesis, title: &str, values: &[f32]| -> Result<Figure, Failure> {
         let series = [Series::new("numbers", Drawn::Marked, distribution(values.iter()))];
+        let zeros = Sizes::of(values.iter()).zeros;
         Ok(Figure {
             id,
             thesis,
             title: title.to_owned(),
             svg: lines(x, count, &series)?,
             caption: format!(
-                "{} numbers of {}, four bins a decade; {} are 0 and not shown.",
+                "{} numbers of {}, four bins a decade; {} are 0 and not shown, nor are numbers outside the axis.",
                 grouped(values.len() as u64),
                 step.name,
-                grouped(sizes.zeros)
+                grouped(zeros)
             ),
             origin: Origin::Measured,
             playback: None,
@@ -83,7 +87,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
     let (cut, high): (Vec<_>, Vec<_>) = errors.iter().copied().partition(|error| error.1 < CUT);
     let cut_dots = thinned(cut.iter().copied(), cut.len());
     let mut all = cut_dots.clone();
-    all.extend(thinned(high.iter().copied(), high.len()));
+    all.extend(high);
     let scatter = |id, thesis, title: &str, dots, caption: String| -> Result<Figure, Failure> {
         let series = [Series::new("error", Drawn::Dots, dots)];
         let svg = lines(x, error_axis, &series)?;
@@ -98,7 +102,7 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
             "Figure 4.7",
             "Error of binary16 on all input numbers",
             all,
-            "Each dot is a number; all large errors are shown, and one of many small ones. Below 6.1e-5 binary16 has subnormal numbers, and \
+            "Each dot is a number: all errors of 1 % and more, and a sample of the smaller ones. Below 6.1e-5 binary16 has subnormal numbers, and \
              the relative error grows; numbers that binary16 holds exactly have no error and no dot."
                 .to_owned(),
         )?,

@@ -47,8 +47,8 @@ fn energies(many: &Studied<Outcome>) -> Result<Figure, Failure> {
         title: "Kinetic energy of the falling pile in each format".to_owned(),
         svg: lines(Axis::linear("step"), Axis::log("kinetic energy, kJ"), &series)?,
         caption: format!(
-            "{}. The thesis judges half by one step; over many steps 16-bit poses stop small motions and \
-             push bodies. Poses in 32 bits (mixed) are the cure.",
+            "{}. The thesis judges half by one step. mixed has poses in \
+             32 bits.",
             many.subject
         ),
         origin: Origin::Measured,

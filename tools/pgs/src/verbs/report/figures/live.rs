@@ -4,7 +4,7 @@ use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Tie
 
 use super::super::chart::{Axis, Drawn, Series, lines};
 use super::super::document::{Figure, Origin, Part, Row};
-use super::super::step::Step;
+use super::super::step::{DEPTH, Step};
 use crate::failure::Failure;
 use crate::numbers::grouped;
 
@@ -12,8 +12,6 @@ use crate::numbers::grouped;
 const RECORDED: u32 = 1528;
 /// Ranges of slots; a curve shows the maximum of each.
 const RANGES: usize = 400;
-/// Depth of the float profile's pipeline, issue slots.
-const DEPTH: u32 = 64;
 
 /// The largest number of each range of slots.
 fn thinned(alive: &[u32]) -> Vec<(f64, f64)> {

@@ -79,9 +79,8 @@ fn after_steps(one: &Studied<Outcome>, many: &Studied<Outcome>) -> Result<Figure
             &series,
         )?,
         caption: format!(
-            "One step: {}, the GPU's order from {}. Many: {}. One step from one state cannot reach the \
-             thesis' figures: positions are up to 80 m, and a step moves a body by centimetres. The same \
-             orders reach them after many steps.",
+            "One step: {}, the GPU's order from {}. Many: {}. A step moves a body by \
+             centimetres, its position is metres: one step leads to less than the thesis' figures.",
             one.subject, one.outcome.gpu_order, many.subject
         ),
         origin: Origin::Measured,

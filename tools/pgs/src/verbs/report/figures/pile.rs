@@ -13,6 +13,7 @@ use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
 use crate::numbers::grouped;
+use crate::options::scenes::DROP;
 
 const STEPS: u16 = 120;
 /// Iterations of each kind: enough to carry 30 layers.
@@ -22,8 +23,8 @@ const EVERY: u16 = 2;
 
 pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Failure> {
     let grid = effort.pile();
-    let mut scene =
-        Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).map_err(Failure::input)?;
+    let mut scene = Scene::new(&SceneOptions { grid, drop: DROP, ..SceneOptions::default() })
+        .map_err(Failure::input)?;
     let mut opened = board::open(common, &Build::default())?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = StepParameters::default()
@@ -33,6 +34,7 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
     recording.add(0, 0.0, scene.bodies());
     let mut most = 0;
     for step in 1..=STEPS {
+        effort.go_on()?;
         most = most.max(scene.detect().len());
         let (bodies, collisions) = scene.parts_mut();
         let stepped = opened.accelerator.step(bodies, collisions, &parameters);
@@ -43,15 +45,14 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
     }
     let cubes = grouped(recording.bodies() as u64);
     let title = format!("{cubes} cubes falling on the ground");
-    let facts = [("scene", format!("{grid} cubes, dropped from 1 m, {STEPS} steps"))];
+    let facts = [("scene", format!("{grid} cubes, dropped from {DROP} m, {STEPS} steps"))];
     let command = format!("pgs run --grid {grid} --view pile.html --picture pile.svg");
     let figure = Figure {
         id: "figure-4-1",
         thesis: "Figure 4.1",
         title: format!("A snapshot of the scene: {cubes} cubes after {STEPS} steps"),
         svg: Picture::of_all(scene.bodies(), scene.geometries()).svg(),
-        caption: "The thesis shows a snapshot of Bullet's demo with the same 38,880 cubes."
-            .to_owned(),
+        caption: "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.".to_owned(),
         origin: Origin::Measured,
         playback: Some(page(&recording, &title, &facts).html),
     };

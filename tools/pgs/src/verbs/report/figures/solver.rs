@@ -34,14 +34,16 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         origin: Origin::Measured,
         playback: None,
     };
-    let passes =
-        |passes: Option<u32>| passes.map_or("more".to_owned(), |passes| passes.to_string());
+    let passes = |passes: Option<u32>, all: &[Pass]| {
+        let most = all.last().map_or(0, |pass| pass.passes);
+        passes.map_or_else(|| format!("more than {most}"), |passes| passes.to_string())
+    };
     let ours = outcome.tolerances.iter().map(|at| {
         format!(
             "{:.0e}: {} contact, {} friction",
             at.tolerance,
-            passes(at.contact.residual),
-            passes(at.friction.residual)
+            passes(at.contact.residual, &outcome.contact),
+            passes(at.friction.residual, &outcome.friction)
         )
     });
     let mut rows = vec![Row {
@@ -58,7 +60,10 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         rows.push(Row {
             thesis: "§4.4".to_owned(),
             subject: "share of collision response in a step, the rest is the search".to_owned(),
-            recorded: "60 % response, 40 % search".to_owned(),
+            recorded: format!(
+                "{:.0} % response, the rest is the search",
+                shares.recorded_share * 100.0
+            ),
             ours: format!("{} response on one core of this host", percent(share)),
             origin: Origin::Measured,
             command: split.command,

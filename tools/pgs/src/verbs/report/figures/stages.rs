@@ -12,6 +12,7 @@ use crate::common::CommonArgs;
 use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
 use crate::options::build::described;
+use crate::options::scenes::DROP;
 
 /// Steps before the recorded one: the cubes have landed.
 const STEPS: u32 = 40;
@@ -21,8 +22,8 @@ const SIDE: u16 = 4;
 /// Draws a step of the pile on a board; also its cycles.
 fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u64), Failure> {
     let grid = Grid::new(SIDE, SIDE, SIDE).map_err(Failure::input)?;
-    let mut scene =
-        Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).map_err(Failure::input)?;
+    let mut scene = Scene::new(&SceneOptions { grid, drop: DROP, ..SceneOptions::default() })
+        .map_err(Failure::input)?;
     let build = Build { profile: Some(profile), ..Build::default() };
     let mut opened = board::open(common, &build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
@@ -80,8 +81,11 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
         ),
     ];
     let command = |profile: &Profile| {
+        let StepParameters { contact_iterations, friction_iterations, .. } =
+            StepParameters::default();
         format!(
-            "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --profile {} --timeline step.svg",
+            "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations {contact_iterations} \
+             --friction-iterations {friction_iterations} --profile {} --json --timeline step.svg",
             STEPS + 1,
             profile.name
         )
