@@ -45,7 +45,7 @@ options=()
 for crate in "${crates[@]}"; do options+=(-p "$crate"); done
 log=$copy/log
 attend timeout 3000 cargo package --manifest-path "$copy/Cargo.toml" --locked --allow-dirty \
-	${verify[@]+"${verify[@]}"} "${options[@]}" 2>&1 | tee "$log"
+	${verify[@]+"${verify[@]}"} "${options[@]}" 2>&1 | tee "$log" || fail "cargo cannot package the crates, as above"
 # A test that a package leaves out needs the golden vectors or another crate's binaries; profiles of the workspace name
 # crates that not every package needs.
 ! grep '^warning: ' "$log" | grep -v -E '^warning: (ignoring (test|benchmark)|profile package spec) ' || fail "cargo warns, as above"

@@ -3,7 +3,7 @@
 # brings, and purges it, after which the system must be as it was before.
 #
 # usage: deb-test.sh [ARCH]     amd64 or arm64 (under user-mode QEMU); this machine's if none
-# environment: DEB_SUITE (Debian's suite, bookworm), DEB_MIRROR (http://deb.debian.org/debian)
+# environment: DEB_SUITE (Debian's suite, bookworm), DEB_MIRROR (mmdebstrap's own)
 #
 # Builds the package by deb.sh. Needs root and the packages of Debian from the network; keeps nothing of the system
 # that it makes.
@@ -47,13 +47,15 @@ if [ -z "${DEB_TEST_WORK-}" ]; then
 		"$0" "$architecture"
 	exit
 fi
+# Only unshare above starts this part, as the first process of its namespace.
+[ $$ = 1 ] && [ -d "$DEB_TEST_WORK" ] || fail "DEB_TEST_WORK is for this script itself: unset it"
 work=$DEB_TEST_WORK
 root=$work/root
 
 # Leaves the exit code as it is.
 end_foreign_programs() {
 	local code=$?
-	echo -1 > "$foreign_entry" || true
+	[ ! -e "$foreign_entry" ] || echo -1 > "$foreign_entry" || true
 	return $code
 }
 
@@ -68,10 +70,10 @@ start_foreign_programs() {
 	magic='\x7fELF\x02\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x02\x00\xb7\x00'
 	mask='\xff\xff\xff\xff\xff\xff\xff\x00\xff\xff\xff\xff\xff\xff\xff\xff\xfe\xff\xff\xff'
 	# F: the kernel keeps the file open, so that it is found in the new system.
-	printf '%s' ":$name:M::$magic:$mask:$(command -v qemu-aarch64-static):F" > $files/register ||
-		skip "the kernel takes no program for files of arm64"
 	foreign_entry=$files/$name
 	trap 'end_foreign_programs || end_all; end_all' EXIT
+	printf '%s' ":$name:M::$magic:$mask:$(command -v qemu-aarch64-static):F" > $files/register ||
+		skip "the kernel takes no program for files of arm64"
 }
 [ $foreign = no ] || start_foreign_programs
 
@@ -81,7 +83,7 @@ needed=(adduser bash-completion libc6 libgcc-s1 man-db pkg-config)
 echo "a new system: ${DEB_SUITE:-bookworm}, $architecture, with ${needed[*]}"
 attend timeout 1500 mmdebstrap --quiet --mode=root --architectures="$architecture" --variant=minbase \
 	--aptopt='APT::Sandbox::User "root"' --include="$(IFS=,; echo "${needed[*]}")" \
-	"${DEB_SUITE:-bookworm}" "$root" "${DEB_MIRROR:-http://deb.debian.org/debian}" > "$work/log" 2>&1 || {
+	"${DEB_SUITE:-bookworm}" "$root" ${DEB_MIRROR:+"$DEB_MIRROR"} > "$work/log" 2>&1 || {
 	tail -n 20 "$work/log" >&2
 	skip "no system can be made: is there a network?"
 }
@@ -140,7 +142,7 @@ shows "the group" "pgs:x:" within getent group pgs
 # In user-mode QEMU man's filter of system calls does not work.
 page() { within MAN_DISABLE_SECCOMP=1 MANWIDTH=80 man --warnings "$1"; }
 shows "man pgs" "Steps rigid bodies on the zynq-pgs accelerator" page pgs
-verbs=$(within pgs --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | grep -v -x help)
+verbs=$(within pgs --help | sed -n '/^Commands:/,/^$/s/^  \([a-z][a-z0-9-]*\) .*/\1/p' | grep -v -x help || true)
 [ -n "$verbs" ] || fail "pgs --help lists no verb"
 for verb in $verbs; do shows "man pgs-$verb" "EXAMPLES" page "pgs-$verb"; done
 
@@ -158,7 +160,8 @@ if [ $foreign = no ]; then
 fi
 
 # The directories of the system are left out as the compiler's own.
-shows "pkg-config --cflags" "" within pkg-config --cflags zynq-pgs
+flags=$(within pkg-config --cflags zynq-pgs)
+[ -z "${flags// /}" ] || fail "pkg-config --cflags: expected nothing, found $flags"
 shows "pkg-config --cflags, all" "-I/usr/include" within PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 pkg-config --cflags zynq-pgs
 shows "pkg-config --libs" "-lzynq_pgs_c" within pkg-config --libs zynq-pgs
 shows "pkg-config --modversion" "$version" within pkg-config --modversion zynq-pgs

@@ -5,12 +5,14 @@
 # usage: deb.sh [ARCH]     amd64 or arm64; this machine's if none
 # environment: DEB_MAINTAINER (who answers for the package), SOURCE_DATE_EPOCH (the last commit's time)
 #
-# The same sources and compiler make the same file. arm64 is built by aarch64-env.sh's cross compiler.
+# The same sources, compiler and folders make the same file. arm64 is built by aarch64-env.sh's cross compiler.
 # Exit code: 0 done, 1 the build failed, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 . "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
+# The rights of the files do not depend on the builder's.
+umask 022
 
 command -v dpkg-deb >/dev/null || skip "needs dpkg-deb, and this is no Debian"
 native=$(dpkg --print-architecture)
@@ -34,7 +36,10 @@ litter+=("$tree")
 chmod 755 "$tree"
 
 # The tool and the C library; in the cargo features that every build of both has.
-build() { attend timeout 1800 cargo build --release --locked -p pgs -p zynq-pgs-c "$@"; }
+build() {
+	attend timeout 1800 cargo build --release --locked -p pgs -p zynq-pgs-c "$@" ||
+		fail "cargo does not build the tool and the library"
+}
 
 # The pages come from a tool that runs here. It is built first, so that the one to pack replaces it.
 pages=$packages/pages

@@ -86,7 +86,7 @@ manifest=$work/zynq-pgs-$version/Cargo.toml
 # unshare: without network, where this machine allows it.
 alone=()
 ! unshare --net true 2>/dev/null || alone=(unshare --net)
-# In the folder of the sources: another one may have settings for cargo.
+# Outside the repository, whose settings for cargo would hold.
 cd "$work"
 CARGO_HOME=$work/cargo_home "${alone[@]}" cargo metadata --frozen --format-version 1 --manifest-path "$manifest" >/dev/null ||
 	fail "the list of crates is not enough"
@@ -94,9 +94,9 @@ echo "cargo resolves the layer's crates"
 [ $build = yes ] || exit 0
 
 (
-	. tools/scripts/aarch64-env.sh
+	. "$repository/tools/scripts/aarch64-env.sh"
 	export CARGO_HOME=$work/cargo_home
 	with_shared_library attend timeout 1800 "${alone[@]}" cargo build --frozen --target "$aarch64" --release \
 		--manifest-path "$manifest" -p pgs -p zynq-pgs-c
-)
-echo "built from the layer alone, for aarch64, without network"
+) || fail "the layer's sources do not build"
+echo "built from the layer alone, for aarch64${alone[*]:+, without network}"

@@ -217,7 +217,9 @@ impl Channel {
                 return Transferred::Stopped;
             }
         };
-        let ends = self.direction == Direction::S2mm && stream.next_last() == Some(n - 1);
+        let recorded = with.recorder.is_some();
+        let ends =
+            recorded && self.direction == Direction::S2mm && stream.next_last() == Some(n - 1);
         let Some(mut ended) = self.transfer(build, n, mask, part, stream, with) else {
             return Transferred::Stopped;
         };

@@ -65,7 +65,8 @@ impl PendingConnections {
 
     /// Sets the time limit of the drivers that connect from now on.
     pub(super) fn set_limit(&mut self, limit: Duration) {
-        self.limit = limit;
+        // An instant beyond a year can overflow.
+        self.limit = limit.min(Duration::from_secs(366 * 24 * 3600));
     }
 
     /// Removes the oldest connection that has sent a request or has ended.

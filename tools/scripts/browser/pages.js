@@ -61,8 +61,9 @@ async function view(page, { measure, screenshot }) {
 	await page.mouse.up();
 	const dragged = await pixels(page);
 	assert.notEqual(turned, dragged, "the mouse turns the view");
+	const distance = await page.evaluate(() => window.player.camera.distance);
 	await page.mouse.wheel(0, 300);
-	await page.waitForTimeout(100);
+	await page.waitForFunction(before => window.player.camera.distance !== before, distance, { timeout: 10000 });
 	assert.notEqual(dragged, await pixels(page), "the wheel zooms");
 	await page.keyboard.press("0");
 	assert.equal(before, await pixels(page), "the key 0 brings the first view back");

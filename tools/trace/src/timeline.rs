@@ -79,7 +79,7 @@ fn packet_class(phase: Option<StepPhase>) -> &'static str {
     }
 }
 
-/// The words of a name that fit less room: the number of a pass alone.
+/// What is left of a name where it has no room: its last word, the number of a pass.
 fn short(name: &str) -> &str {
     name.rsplit(' ').next().unwrap_or(name)
 }
@@ -280,7 +280,7 @@ fn axis(picture: &mut Picture, scale: &Scale, y: f64) -> f64 {
         }
         let x = scale.place(time * 1e3);
         picture.path("line", &format!("M{x:.2} {y:.1}v5"));
-        // Ten digits suffice, and hide what the sums of the step left behind.
+        // Three decimals suffice, and hide the rounding of the product.
         let text = format!("{time:.3}");
         let text = text.trim_end_matches('0').trim_end_matches('.');
         let unit = if number == 0 { " us" } else { "" };

@@ -1,8 +1,7 @@
 //! Writes a recording as glTF 2.0: a node for each body, with an animation of its translation and
 //! rotation.
 //!
-//! Node 0 is the ground, node k the k-th moving body, which is body k where the ground is body 0 and
-//! all others move. All bodies of one kind share a mesh, and all channels share the accessor of the
+//! Node 0 is the ground, node k the k-th moving body: body k of a scene whose ground is body 0. All bodies of one kind share a mesh, and all channels share the accessor of the
 //! times. The buffer has the times, the surfaces, and for each body its translations and its
 //! rotations in the order of time.
 //!

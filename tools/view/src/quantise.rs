@@ -158,7 +158,7 @@ fn zigzag(now: u16, before: u16) -> [u8; 2] {
     ((difference << 1) ^ negative).to_le_bytes()
 }
 
-/// Squared distance from one pose to the next, over the time between.
+/// Distance from one pose to the next over the time between, m/s.
 fn speeds<'a>(before: &'a Frame, now: &'a Frame) -> impl Iterator<Item = f32> + 'a {
     let time = now.time - before.time;
     before.poses.iter().zip(&now.poses).map(move |(before, now)| {

@@ -37,6 +37,9 @@ pub struct Frame {
     pub poses: Vec<Pose>,
 }
 
+/// Place of a body that no frame has shown.
+const ORIGIN: Pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+
 /// The poses of the moving bodies at some steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -71,15 +74,18 @@ impl Recording {
         recording
     }
 
-    /// Adds a frame after `step` steps; does nothing if the last frame is that one.
-    ///
-    /// # Panics
-    /// If `bodies` are fewer than at the beginning.
+    /// Adds a frame after `step` steps; does nothing if the last frame is that one. A body that `bodies`
+    /// lacks stays where it was.
     pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) {
         if self.frames.last().is_some_and(|frame| frame.step == step) {
             return;
         }
-        let poses = self.bodies.iter().map(|index| bodies[*index].pose).collect();
+        let last = self.frames.last().map(|frame| frame.poses.as_slice()).unwrap_or_default();
+        let was = |place: usize| last.get(place).copied().unwrap_or(ORIGIN);
+        let poses = self.bodies.iter().enumerate();
+        let poses =
+            poses.map(|(place, index)| bodies.get(*index).map_or_else(|| was(place), |b| b.pose));
+        let poses = poses.collect();
         self.frames.push(Frame { step, time, poses });
     }
 
@@ -155,6 +161,9 @@ mod tests {
         assert_eq!(recording.frames().len(), 3);
         recording.add(2, 0.2, &[]);
         assert_eq!(recording.frames().len(), 3);
+        // Bodies that are missing stay where they were.
+        recording.add(3, 0.3, &[]);
+        assert_eq!(recording.frames()[3].poses, recording.frames()[2].poses);
     }
 
     #[test]

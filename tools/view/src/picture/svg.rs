@@ -95,7 +95,7 @@ fn unit(value: f32) -> i32 {
         clippy::cast_possible_truncation,
         reason = "a number beyond the picture becomes its end"
     )]
-    let whole = (value + 0.5).floor() as i32;
+    let whole = (value + 0.5).floor().clamp(-1e6, 1e6) as i32;
     whole
 }
 
