@@ -1,6 +1,7 @@
 //! The verb `run`: steps a scene, shows the cost of every step, and sums up.
 
 mod beside;
+mod end;
 mod energy;
 mod files;
 mod row;
@@ -11,32 +12,29 @@ use std::io::{self, Write};
 use bitstream_model::interface::extension::Extensions;
 use clap::Args;
 use scene::Scene;
-use serde_json::{Value, json};
+use serde_json::Value;
 use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
+use self::end::{document, print_end};
 use self::files::{FileArgs, Film, Written};
 use self::row::{ALL_COLUMNS, Row, columns, step};
-use self::summary::{Summary, Totals};
+use self::summary::Totals;
 use crate::board::{self, OpenBoard};
 use crate::bug_report::FaultArgs;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::footprint::Footprint;
 use crate::interrupt::Interrupt;
-use crate::numbers::grouped;
-use crate::options::bandwidth::bandwidth_text;
 use crate::options::build::BuildArgs;
 use crate::options::ordering::OrderingArgs;
 use crate::options::planned::PlannedArgs;
 use crate::options::scenes::{CONTACT_REACH, SceneArgs};
 use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
-use crate::output::SCHEMA;
 use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
-use crate::permutation::Permutation;
 use crate::traced::{TracedArgs, Tracing};
 use step_folder::digest;
 
@@ -377,100 +375,4 @@ fn print_heading(
         false => heading(out, &all_columns(opened, beside_cold))?,
     }
     out.flush()
-}
-
-/// The summary of the run; none before the first step.
-fn summary<'a>(
-    args: &RunArgs,
-    parameters: &'a StepParameters,
-    opened: &OpenBoard,
-    scene: &mut Scene,
-    course: &'a Course,
-) -> Option<Summary<'a>> {
-    let last = course.last.as_ref()?;
-    let facts = summary::BoardFacts {
-        profile: opened.accelerator.capabilities().variant.profile,
-        is_emulated: is_emulated(opened),
-        bandwidth: opened.config().map(|config| bandwidth_text(config.bandwidth)),
-    };
-    let cubes = args.scene.is_cubes();
-    Some(Summary::new(&course.totals, parameters, facts, cubes, (scene, last)))
-}
-
-fn print_end(
-    args: &RunArgs,
-    parameters: &StepParameters,
-    opened: &OpenBoard,
-    scene: &mut Scene,
-    course: &mut Course,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    writeln!(out)?;
-    let cold = course.cold.as_mut().and_then(Cold::end_text);
-    let Course { done, retries, orders, footprint, .. } = &*course;
-    if *done != args.steps() {
-        writeln!(out, "interrupted after {done} of {} steps", args.steps())?;
-    }
-    if let Some(faults) = opened.faults_text() {
-        writeln!(out, "{faults}")?;
-    }
-    if *retries > 0 {
-        fact(out, "retries", &format!("{} of {done} steps", grouped(*retries)))?;
-    }
-    if let Some(summary) = summary(args, parameters, opened, scene, course) {
-        summary.print(out)?;
-    }
-    if let Some((energy, _)) = &course.energy {
-        fact(out, "energy", energy)?;
-    }
-    if let Some(cold) = cold {
-        fact(out, "cold", &cold)?;
-    }
-    if let Some(orders) = orders.text() {
-        fact(out, "orders", &orders)?;
-    }
-    if let Some(memory) = footprint.text() {
-        fact(out, "memory", &memory)?;
-    }
-    writeln!(out, "digest     {} {:016x}", digest::ALGORITHM, digest::of_bodies(scene.bodies()))
-}
-
-fn document(
-    args: &RunArgs,
-    parameters: &StepParameters,
-    opened: &OpenBoard,
-    scene: &mut Scene,
-    mut course: Course,
-    complete: bool,
-) -> Value {
-    let mut config = args.scene.to_json();
-    config["steps"] = args.steps().into();
-    config["contact_iterations"] = parameters.contact_iterations.into();
-    config["friction_iterations"] = parameters.friction_iterations.into();
-    config["time_step_s"] = parameters.time_step.into();
-    config["spin_damping"] = parameters.spin_damping.into();
-    config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
-    config["warm_start"] = parameters.warm_start.into();
-    config["pair_friction"] = parameters.pair_friction.into();
-    config["shape_friction"] = parameters.shape_friction.into();
-    config["time_step"] = time_step_text(parameters.time_step).into();
-    let steps = std::mem::take(&mut course.documents);
-    let cold = course.cold.as_mut().and_then(Cold::end_json);
-    let summary = summary(args, parameters, opened, scene, &course);
-    let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
-    json!({
-        "schema": SCHEMA,
-        "verb": "run",
-        "config": config,
-        "board": opened.to_json(),
-        "complete": complete,
-        "steps": steps,
-        "summary": summary.map(|summary| summary.to_json()),
-        "beside_cold": cold,
-        "energy": course.energy.as_ref().map(|(_, energy)| energy),
-        "faults": opened.faults_json(),
-        "traced": args.traced.to_json(),
-        "memory": course.footprint.to_json(),
-        "digest": { "algorithm": digest::ALGORITHM, "value": digest },
-    })
 }
