@@ -184,7 +184,7 @@ fn strays(row: &Value, start: f64) -> Option<String> {
 
 #[test]
 fn over_many_steps_mixed_stays_with_float_and_half_freezes() {
-    let scene = ["--grid", "5x5x5", "--steps", "300", "--drop", "5"];
+    let scene = ["--grid", "6x6x6", "--steps", "300", "--drop", "5"];
     let against_float = |build| compare(&[&["float", build], &scene[..]].concat());
     let rows = |document: &Value| document["rows"].as_array().expect("rows").clone();
 
