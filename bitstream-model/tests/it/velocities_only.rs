@@ -7,7 +7,8 @@ use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
 use crate::common::scene::{Step, bits, result_beats};
 use crate::common::sg::{Flight, LONG, Machine};
 
-/// The velocities are those of the same step with poses. No poses go in, and half the beats come out.
+/// A step without poses gives the velocities of the same step with poses. It takes no poses in, and sends
+/// half the beats.
 #[test]
 fn a_step_without_poses_gives_out_velocities_alone() {
     for profile in [&FLOAT, &NAIVE, &HALF, &MIXED] {

@@ -51,7 +51,7 @@ impl Mesh {
         }
     }
 
-    /// Adds a corner; returns its index. No mesh here has as many corners as 16 bits can count.
+    /// Adds a corner; returns its index. The largest mesh has a few hundred corners, which 16 bits count.
     fn corner(&mut self, position: [f32; 3], normal: [f32; 3]) -> u16 {
         self.positions.push(position);
         self.normals.push(normal);

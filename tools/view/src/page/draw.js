@@ -177,7 +177,7 @@ class Painter {
 		return texture;
 	}
 
-	// The triangles of up to `count` bodies with so many corners each.
+	// The triangles of up to `count` bodies. Each body has `corners` corners.
 	repeated(triangles, corners, count) {
 		const gl = this.gl;
 		const most = Math.max(Math.min(count, Math.floor(CORNERS_MOST / corners)), 1);

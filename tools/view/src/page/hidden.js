@@ -7,7 +7,7 @@ const CELLS_OF_DISC = 2.5; // Radius of the middle body's disc, in cells.
 const CELLS_MOST = 1 << 18;
 
 class Cover {
-	// The radii are those of each kind: of the disc that it covers, and of the ball around it.
+	// Each kind of body has two radii: of the disc that the body covers, and of the ball around the body.
 	constructor(kinds, covering, around) {
 		this.kinds = kinds;
 		this.covering = covering;
@@ -27,7 +27,7 @@ class Cover {
 		this.cells.fill(0, 0, this.width * this.height);
 	}
 
-	// Whether a body at this place may be seen; it then covers what lies behind it.
+	// Returns whether a body at this place may be seen. A visible body covers the bodies behind it.
 	isSeen(body, x, y, z) {
 		const { matrix: m, width, height, cells } = this;
 		const kind = this.kinds[body];

@@ -4,8 +4,10 @@ use clap::{Args, Command};
 use scene::Grid;
 
 use super::ReportArgs;
+use super::chart::{Axis, Drawn, Series, lines};
 use crate::failure::{Cause, Failure};
 use crate::histogram::Histogram;
+use crate::verbs::study::recorded::RecordedDeviation;
 use crate::verbs::study::{Session, determinism, half, split, stopping, time_step};
 
 /// The outcome of a study.
@@ -192,6 +194,19 @@ pub(super) fn below(histogram: &Histogram) -> Vec<(f64, f64)> {
         sum += count;
     }
     points
+}
+
+/// A chart of the shares of positions that deviate by less, with the thesis' point at 1 %.
+pub(super) fn spread(
+    mut series: Vec<Series>,
+    recorded: &RecordedDeviation,
+) -> Result<String, Failure> {
+    if let Some(share) = recorded.under_1_percent_share.map(|share| share * 100.0) {
+        let name = format!("{share:.2} % below 1 %, recorded");
+        series.push(Series::new(name, Drawn::Marked, vec![(1.0, share)]));
+    }
+    let (x, y) = ("deviation (eq. 4.1), %", "positions that deviate by less, %");
+    lines(Axis::log(x), Axis::linear(y), &series)
 }
 
 /// A share as percent.

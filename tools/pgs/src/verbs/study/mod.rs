@@ -6,7 +6,7 @@
 pub(crate) mod determinism;
 pub(crate) mod half;
 pub(crate) mod ladder;
-mod recorded;
+pub(crate) mod recorded;
 mod run;
 mod session;
 pub(crate) mod split;

@@ -2,26 +2,22 @@
 
 use super::super::chart::{Axis, Drawn, Series, lines};
 use super::super::document::{Figure, Origin, Part, Row};
-use super::super::studies::{Effort, Studied, below, percent};
+use super::super::studies::{Effort, Studied, below, percent, spread};
 use crate::failure::Failure;
-use crate::verbs::study::half::Outcome;
+use crate::verbs::study::half::{OfBuild, Outcome};
+use crate::verbs::study::recorded::HALF_AGAINST_FLOAT;
 
-fn spread(one: &Studied<Outcome>) -> Result<Figure, Failure> {
-    let of = |build: &crate::verbs::study::half::OfBuild| {
+fn after_one_step(one: &Studied<Outcome>) -> Result<Figure, Failure> {
+    let of = |build: &OfBuild| {
         let points = build.position_histogram.as_ref().map(below)?;
         Some(Series::new(build.build.clone(), Drawn::Line, points))
     };
-    let mut series: Vec<Series> = one.outcome.builds.iter().filter_map(of).collect();
-    series.push(Series::new("99.64 % below 1 %, recorded", Drawn::Marked, vec![(1.0, 99.64)]));
+    let series: Vec<Series> = one.outcome.builds.iter().filter_map(of).collect();
     Ok(Figure {
         id: "figure-4-10",
         thesis: "Figure 4.10",
         title: "Deviation of positions in sixteen bits from those of float".to_owned(),
-        svg: lines(
-            Axis::log("deviation (eq. 4.1), %"),
-            Axis::linear("positions that deviate by less, %"),
-            &series,
-        )?,
+        svg: spread(series, &HALF_AGAINST_FLOAT)?,
         caption: format!(
             "{}. half has 16 bits throughout, as the thesis; mixed has collisions of 16 bits relative to \
              body A, and poses in 32.",
@@ -56,9 +52,14 @@ fn energies(many: &Studied<Outcome>) -> Result<Figure, Failure> {
     })
 }
 
+/// A recorded share with the two digits that the thesis prints.
+fn percent_of(share: Option<f64>) -> String {
+    share.map_or_else(|| "not given".to_owned(), |share| format!("{:.2} %", share * 100.0))
+}
+
 pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
     let (one, many) = (effort.half_of_one_step()?, effort.half_of_many_steps()?);
-    let figures = vec![spread(&one)?, energies(&many)?];
+    let figures = vec![after_one_step(&one)?, energies(&many)?];
     let mut rows = Vec::new();
     let half = |outcome: &Outcome| {
         outcome.builds.iter().find(|build| build.build == "half")?.curve.last().cloned()
@@ -77,14 +78,14 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         let (mean, share) = (position.mean * 100.0, percent(position.under_share()));
         rows.push(row(
             "mean deviation of half from float",
-            "0.06 %",
+            &format!("{} %", HALF_AGAINST_FLOAT.mean_percent[0]),
             format!("{mean:.4} %"),
             &one,
             "figure-4-10",
         ));
         rows.push(row(
             "positions of half within 1 % of float's",
-            "99.64 %",
+            &percent_of(HALF_AGAINST_FLOAT.under_1_percent_share),
             share,
             &one,
             "figure-4-10",

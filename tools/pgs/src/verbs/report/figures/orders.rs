@@ -2,14 +2,15 @@
 
 use super::super::chart::{Axis, Drawn, Series, lines};
 use super::super::document::{Figure, Origin, Part, Row};
-use super::super::studies::{Effort, Studied, below, percent};
+use super::super::studies::{Effort, Studied, below, percent, spread};
 use crate::failure::Failure;
 use crate::verbs::study::determinism::{Outcome, Point};
+use crate::verbs::study::recorded::{FLOAT_AGAINST_GPU, TWO_GPU_RUNS};
 
-/// The band of Figure 4.2, percent.
-const RECORDED_BAND: [f64; 2] = [1.0, 3.0];
-/// The point of Figure 4.9: share of positions below 1 %.
-const RECORDED_SHARE: f64 = 84.29;
+/// The share of positions below 1 % in Figure 4.9, percent.
+fn recorded_share() -> f64 {
+    FLOAT_AGAINST_GPU.under_1_percent_share.unwrap_or_default() * 100.0
+}
 
 /// The mean deviation after each step, percent.
 fn means(outcome: &Outcome) -> Vec<(f64, f64)> {
@@ -19,7 +20,7 @@ fn means(outcome: &Outcome) -> Vec<(f64, f64)> {
 
 /// The first step after which the share of positions within 1 % of the GPU's is at most the thesis'.
 fn step_of_recorded_share(outcome: &Outcome) -> Option<u32> {
-    let below = |at: &&Point| at.state.position.under_share() * 100.0 <= RECORDED_SHARE;
+    let below = |at: &&Point| at.state.position.under_share() * 100.0 <= recorded_share();
     outcome.gpu.curve.iter().find(below).map(|at| at.step)
 }
 
@@ -28,12 +29,13 @@ fn over_steps(many: &Studied<Outcome>) -> Result<Figure, Failure> {
     let gpu = outcome.gpu.curve.iter();
     let gpu = gpu.map(|at| (f64::from(at.step), at.state.position.mean * 100.0)).collect();
     let last = outcome.over_pairs.last().map_or(1.0, |at| f64::from(at.step));
-    let band = |share: f64| vec![(1.0, share), (last, share)];
+    let band = |percent: f64| vec![(1.0, percent), (last, percent)];
+    let [low, high] = TWO_GPU_RUNS.mean_percent;
     let series = [
         Series::new("two random orders", Drawn::Line, means(outcome)),
         Series::new("as given against the GPU's", Drawn::Line, gpu),
-        Series::new("1 %, recorded", Drawn::Dashes, band(RECORDED_BAND[0])),
-        Series::new("3 %, recorded", Drawn::Dashes, band(RECORDED_BAND[1])),
+        Series::new(format!("{low} %, recorded"), Drawn::Dashes, band(low)),
+        Series::new(format!("{high} %, recorded"), Drawn::Dashes, band(high)),
     ];
     Ok(Figure {
         id: "figure-4-2",
@@ -63,20 +65,11 @@ fn after_steps(one: &Studied<Outcome>, many: &Studied<Outcome>) -> Result<Figure
     ] {
         series.extend(points.map(|points| Series::new(name, Drawn::Line, points)));
     }
-    series.push(Series::new(
-        "84.29 % below 1 %, recorded",
-        Drawn::Marked,
-        vec![(1.0, RECORDED_SHARE)],
-    ));
     Ok(Figure {
         id: "figure-4-9",
         thesis: "Figure 4.9",
         title: "Deviation of positions between the accelerator's order and the GPU's".to_owned(),
-        svg: lines(
-            Axis::log("deviation (eq. 4.1), %"),
-            Axis::linear("positions that deviate by less, %"),
-            &series,
-        )?,
+        svg: spread(series, &FLOAT_AGAINST_GPU)?,
         caption: format!(
             "One step: {}, the GPU's order from {}. Many: {}. A step moves a body by \
              centimetres, its position is metres: one step leads to less than the thesis' figures.",
@@ -112,7 +105,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         row(
             "§4.5, Figure 4.2",
             "mean deviation of two executions",
-            "1 % to 3 %",
+            &format!("{} % to {} %", TWO_GPU_RUNS.mean_percent[0], TWO_GPU_RUNS.mean_percent[1]),
             format!(
                 "{:.4} ± {:.4} % after one step, {:.2} % after {}",
                 first.position_mean_percent.mean,
@@ -128,13 +121,13 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
     if let (Some(first), Some(last)) = ends {
         let [one_step, steps] = [first, last].map(|at| at.state.position);
         let reached = match step_of_recorded_share(&many.outcome) {
-            Some(step) => format!("{RECORDED_SHARE} % is passed in step {step}"),
+            Some(step) => format!("{:.2} % is passed in step {step}", recorded_share()),
             None => format!("{} after {} steps", percent(steps.under_share()), last.step),
         };
         row(
             "§4.6.3, Figure 4.9",
             "positions of the accelerator that deviate from the GPU's by less than 1 %",
-            "84.29 %",
+            &format!("{:.2} %", recorded_share()),
             format!("{} after one step; of our pile {reached}", percent(one_step.under_share())),
             &one,
             "figure-4-9",
@@ -142,7 +135,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         row(
             "§4.6.3, Figure 4.9",
             "mean deviation of the accelerator's positions from the GPU's",
-            "2.97 %",
+            &format!("{} %", FLOAT_AGAINST_GPU.mean_percent[0]),
             format!(
                 "{:.4} % after one step; of our pile {:.2} % after {}",
                 one_step.mean * 100.0,

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::residual::Residuals;
 use super::{Outcome, Pass, Tolerance};
 use crate::numbers::{grouped, number};
 use crate::output::facts::fact;
@@ -35,6 +36,17 @@ const RULES: [Column; 7] = [
     Column { name: "until", unit: "each", width: 7 },
 ];
 
+/// A table of the residuals after some passes.
+fn residuals(
+    out: &mut dyn Write,
+    columns: &[Column],
+    passes: &[Pass],
+    of: impl Fn(&Residuals) -> [f64; 3],
+) -> io::Result<()> {
+    heading(out, columns)?;
+    shown(passes).try_for_each(|pass| line(out, columns, cells(pass, of(&pass.residuals))))
+}
+
 /// Shows the outcome.
 pub(in super::super) fn show(outcome: &Outcome, out: &mut dyn Write) -> io::Result<()> {
     let step = format!(
@@ -46,37 +58,14 @@ pub(in super::super) fn show(outcome: &Outcome, out: &mut dyn Write) -> io::Resu
     );
     fact(out, "step", &step)?;
     writeln!(out)?;
-    heading(out, &CONTACT)?;
-    for pass in shown(&outcome.contact) {
-        line(
-            out,
-            &CONTACT,
-            cells(
-                pass,
-                [
-                    pass.residuals.contact.rms,
-                    pass.residuals.contact.largest,
-                    pass.residuals.fischer_burmeister.rms,
-                ],
-            ),
-        )?;
-    }
+    let Outcome { contact, friction, .. } = outcome;
+    residuals(out, &CONTACT, contact, |Residuals { contact, fischer_burmeister, .. }| {
+        [contact.rms, contact.largest, fischer_burmeister.rms]
+    })?;
     writeln!(out)?;
-    heading(out, &FRICTION)?;
-    for pass in shown(&outcome.friction) {
-        line(
-            out,
-            &FRICTION,
-            cells(
-                pass,
-                [
-                    pass.residuals.friction.rms,
-                    pass.residuals.friction.largest,
-                    pass.residuals.contact.rms,
-                ],
-            ),
-        )?;
-    }
+    residuals(out, &FRICTION, friction, |Residuals { friction, contact, .. }| {
+        [friction.rms, friction.largest, contact.rms]
+    })?;
     writeln!(out)?;
     heading(out, &RULES)?;
     for tolerance in &outcome.tolerances {
