@@ -31,7 +31,9 @@ pub(crate) mod window;
 use crate::cast::register;
 use crate::config::BoardConfig;
 use crate::config::quirks::Resettable;
-use crate::fault::{FaultKind, Faults, Place, StepPhase, StepShape, Streamed, end_of_reset};
+use crate::fault::{
+    FaultKind, Faults, PassKind, Place, StepPhase, StepShape, Streamed, end_of_reset, pass_of,
+};
 use crate::memory::Memory;
 use crate::recording::{Stage, StageCounts, StageLog, StageSpan};
 use crate::stream::Stream;
@@ -191,7 +193,7 @@ impl Accelerator {
                 self.start_due = false;
                 self.debt = 0;
                 self.hung = false;
-                self.note_stage();
+                self.cut_stage_short();
                 Some(false)
             }
         }
@@ -220,8 +222,15 @@ impl Accelerator {
     }
 
     /// Notes the stages from now on.
-    pub(crate) fn watch_stages(&mut self) {
-        self.stages = Some(Box::default());
+    pub(crate) fn watch_stages(&mut self, now: u64) {
+        let clock = if matches!(self.phase, Phase::Idle | Phase::Failed) { 0 } else { self.clock };
+        self.stages = Some(Box::new(StageLog::new(now, clock)));
+    }
+
+    /// Goes on with the notes of another accelerator, whose place this one takes.
+    pub(crate) fn watch_after(&mut self, before: &mut Self) {
+        before.cut_stage_short();
+        self.stages = before.stages.take();
     }
 
     /// A step begins at a clock of the board.
@@ -236,28 +245,44 @@ impl Accelerator {
         self.stages.as_ref().map(|stages| stages.sent_at())
     }
 
-    /// The stages that have ended since they are watched, and watches no more.
+    /// The stages since they are watched, and watches no more.
     pub(crate) fn take_stages(&mut self) -> Vec<StageSpan> {
+        self.cut_stage_short();
         self.stages.take().map_or_else(Vec::new, |stages| stages.finish())
     }
 
+    fn stage_counts(&self) -> StageCounts {
+        let Counters { stalls, waits, hazards, .. } = self.counters;
+        StageCounts { stalls, waits, hazards }
+    }
+
     fn note_stage(&mut self) {
+        let (clock, counts) = (self.clock, self.stage_counts());
         let Some(stages) = &mut self.stages else { return };
-        let contact = self.arguments.contact_passes();
         let stage = match self.phase {
-            Phase::Idle | Phase::Failed => None,
+            Phase::Idle => None,
+            Phase::Failed => return stages.cut_short(clock, counts),
             Phase::Ending => return,
             Phase::Load(_) => Some(Stage::Load),
-            Phase::Pass { number, .. } => Some(match number.checked_sub(contact) {
-                None => Stage::Contact(number + 1),
-                Some(number) => Stage::Friction(number + 1),
-            }),
+            Phase::Pass { number, .. } => {
+                Some(match pass_of(number, self.arguments.contact_passes()) {
+                    (PassKind::Contact, pass) => Stage::Contact(pass),
+                    (PassKind::Friction, pass) => Stage::Friction(pass),
+                })
+            }
             Phase::Integrate { .. } => Some(Stage::Integrate),
             Phase::SendVelocities(_) => Some(Stage::SendVelocities),
             Phase::Window => Some(Stage::Window),
         };
-        let Counters { stalls, waits, hazards, .. } = self.counters;
-        stages.note(stage, self.clock, StageCounts { stalls, waits, hazards });
+        stages.note(stage, clock, counts);
+    }
+
+    /// Notes that the stage under way does not end by itself.
+    fn cut_stage_short(&mut self) {
+        let (clock, counts) = (self.clock, self.stage_counts());
+        if let Some(stages) = &mut self.stages {
+            stages.cut_short(clock, counts);
+        }
     }
 
     /// Whether a step begins with the next run.
@@ -395,12 +420,8 @@ impl Accelerator {
             Phase::Window => (None, None),
             Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
             Phase::Pass { number, segment } => {
-                let contact = self.arguments.contact_passes();
-                let phase = match number.checked_sub(contact) {
-                    None => StepPhase::Contact(number + 1),
-                    Some(number) => StepPhase::Friction(number + 1),
-                };
-                (Some(phase), Some(segment))
+                let pass = StepPhase::of_pass(*number, self.arguments.contact_passes());
+                (Some(pass), Some(segment))
             }
             Phase::Integrate { poses, .. } => (Some(StepPhase::Poses), Some(poses)),
         };

@@ -128,6 +128,11 @@ impl Channel {
         !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
     }
 
+    /// Whether an error has stopped the channel.
+    pub(super) fn has_failed(&self) -> bool {
+        self.latched & dmasr::ERRORS != 0 && !dmacr::RS.is_set(self.control)
+    }
+
     /// Whether RS was cleared and the channel has not halted yet.
     pub(super) fn stopping(&self) -> bool {
         matches!(self.transition, Some((_, Transition::Halt)))
@@ -318,8 +323,11 @@ impl Channel {
         true
     }
 
-    pub(super) fn tick(&mut self, now: u64) {
-        if let Some((_, what)) = self.transition.filter(|(at, _)| *at <= now) {
+    /// Changes the states that change by time alone; returns whether the channel has halted, which drops
+    /// its work.
+    pub(super) fn tick(&mut self, now: u64) -> bool {
+        let due = self.transition.filter(|(at, _)| *at <= now);
+        if let Some((_, what)) = due {
             self.transition = None;
             match what {
                 Transition::Run => self.halted = false,
@@ -338,6 +346,7 @@ impl Channel {
             self.latched |= dmasr::DLY_IRQ.mask();
             self.packets_to_go = dmacr::IRQ_THRESHOLD.of(self.control);
         }
+        matches!(due, Some((_, Transition::Halt)))
     }
 
     pub(super) fn next_event(&self) -> Option<u64> {

@@ -83,6 +83,14 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) recorder: Option<&'a mut Recorder>,
 }
 
+/// Everything outside a core that a write to a register needs.
+pub(crate) struct WriteSurroundings<'a> {
+    pub(crate) log: &'a mut Log,
+    pub(crate) faults: &'a mut Faults,
+    /// Takes notes, if the board is to be recorded.
+    pub(crate) recorder: Option<&'a mut Recorder>,
+}
+
 /// One AXI DMA.
 #[derive(Debug)]
 pub(crate) struct Core {
@@ -151,9 +159,9 @@ impl Core {
         now: u64,
         offset: u32,
         value: u32,
-        log: &mut Log,
-        faults: &mut Faults,
+        with: WriteSurroundings<'_>,
     ) -> Option<bool> {
+        let WriteSurroundings { log, faults, recorder } = with;
         let (direction, at) = Self::decode(offset);
         if self.reset_until.is_some() {
             // The core is deaf until the reset has ended.
@@ -165,6 +173,9 @@ impl Core {
             self.reset_until = Some(end_of_reset(&self.config, now, fault));
             self.mm2s.stop();
             self.s2mm.stop();
+            if let Some(recorder) = recorder {
+                self.abandons_all(now, recorder);
+            }
             log.withdraw_pardon();
             return Some(false);
         }
@@ -185,15 +196,27 @@ impl Core {
         Some(doorbell)
     }
 
+    /// Notes that both channels drop what is under way.
+    pub(crate) fn abandons_all(&self, now: u64, recorder: &mut Recorder) {
+        for channel in [&self.mm2s, &self.s2mm] {
+            recorder.abandons((self.build.core, channel.direction), now);
+        }
+    }
+
     /// Changes the states that change by time alone.
-    pub(crate) fn tick(&mut self, now: u64) {
+    pub(crate) fn tick(&mut self, now: u64, recorder: Option<&mut Recorder>) {
         if self.reset_until.is_some_and(|until| until <= now) {
             self.reset_until = None;
             self.mm2s = Channel::new(Direction::Mm2s);
             self.s2mm = Channel::new(Direction::S2mm);
         }
-        self.mm2s.tick(now);
-        self.s2mm.tick(now);
+        let halted = [&mut self.mm2s, &mut self.s2mm]
+            .map(|channel| channel.tick(now).then_some(channel.direction));
+        if let Some(recorder) = recorder {
+            for direction in halted.into_iter().flatten() {
+                recorder.abandons((self.build.core, direction), now);
+            }
+        }
     }
 
     /// The cycle of the next change by time alone.
@@ -241,6 +264,9 @@ impl Core {
         }
         let outcome = channel.run(&build, start, end, limit, stream, with);
         if let Some(recorder) = &mut with.recorder {
+            if channel.has_failed() {
+                recorder.abandons((build.core, direction), channel.time);
+            }
             channel.note_rest(&build, stream, recorder);
         }
         outcome

@@ -10,7 +10,7 @@ use super::{Build, PacketCount, Surroundings};
 use crate::cast::register;
 use crate::fault::FaultKind;
 use crate::memory::Denied;
-use crate::recording::Recorder;
+use crate::recording::{MovedBeats, Recorder};
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
 use pgs_interface::axi_dma::Direction;
@@ -240,9 +240,16 @@ impl Channel {
             }
         }
         if let Some(recorder) = &mut with.recorder {
-            let last = ends || self.direction == Direction::Mm2s && stream.ends_with_last();
-            let beats = (n as u64, 1 << self.beat_shift(build));
-            recorder.moves((build.core, self.direction), begin, beats, last);
+            let (core, direction) = (build.core, self.direction);
+            let before = self.beats - n as u64;
+            let moved = MovedBeats {
+                beats: n as u64,
+                clocks: 1 << self.beat_shift(build),
+                last: ends || direction == Direction::Mm2s && stream.ends_with_last(),
+                before,
+                phase: with.faults.phase(core, direction).filter(|_| before == 0),
+            };
+            recorder.moves((core, direction), begin, &moved);
         }
         Transferred::Beats { n, ended }
     }
@@ -526,7 +533,7 @@ impl Channel {
         let phase = with.faults.phase(core, direction);
         with.moved.packets.push(PacketCount { core, direction, phase, beats, descriptors });
         if let Some(recorder) = &mut with.recorder {
-            recorder.packet_ends((core, direction), self.time, phase, (beats, descriptors));
+            recorder.packet_ends((core, direction), self.time);
         }
         with.faults.packet_ends(core, direction);
         (self.beats, self.descriptors) = (0, 0);

@@ -13,7 +13,7 @@ use self::bus::Target;
 use self::interrupt::InterruptLine;
 use self::short_cut::{ShortCut, Stretch};
 use crate::accelerator::Accelerator;
-use crate::axi_dma::{Core, Moved, PacketCount, Surroundings};
+use crate::axi_dma::{Core, Moved, PacketCount, Surroundings, WriteSurroundings};
 use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
 use crate::external::{ExternalAccelerator, ExternalError, Installed};
@@ -158,7 +158,7 @@ impl Board {
         let level = self.interrupt.level();
         let recorder = Recorder::new(self.now, clock, self.cores.len(), level);
         self.recorder = Some(Box::new(recorder));
-        self.accelerator.model.watch_stages();
+        self.accelerator.model.watch_stages(self.now);
     }
 
     /// Ends the recording.
@@ -176,6 +176,9 @@ impl Board {
                 self.other_design = Some(identification);
                 self.log.pardon();
                 for (number, core) in self.cores.iter_mut().enumerate() {
+                    if let Some(recorder) = &mut self.recorder {
+                        core.abandons_all(self.now, recorder);
+                    }
                     *core = Core::new(number, &self.config);
                 }
                 self.accelerator.replace_model(Accelerator::new(&self.config));
@@ -252,9 +255,12 @@ impl Board {
         }
         let (now, log, faults) = (self.now, &mut self.log, &mut self.faults);
         let done = match bus::decode(address, self.cores.len()) {
-            Target::Dma { core, offset } => self.cores[core]
-                .write(now, offset, value, log, faults)
-                .ok_or(ViolationKind::ReservedRegister { address }),
+            Target::Dma { core, offset } => {
+                let recorder = self.recorder.as_deref_mut();
+                let with = WriteSurroundings { log, faults, recorder };
+                let done = self.cores[core].write(now, offset, value, with);
+                done.ok_or(ViolationKind::ReservedRegister { address })
+            }
             Target::Control { .. } if self.other_design.is_some() => Ok(false),
             Target::Control { offset } => self
                 .accelerator
@@ -403,7 +409,7 @@ impl Board {
 
     fn tick(&mut self) {
         for core in &mut self.cores {
-            core.tick(self.now);
+            core.tick(self.now, self.recorder.as_deref_mut());
         }
         if self.accelerator.tick(self.now) {
             self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);

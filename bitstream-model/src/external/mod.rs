@@ -316,8 +316,10 @@ impl Installed {
         Self { model, external: external.map(External::new) }
     }
 
-    /// Another design takes the model's place; an external accelerator stays where it is.
-    pub(crate) fn replace_model(&mut self, model: Accelerator) {
+    /// Another design takes the model's place; an external accelerator stays where it is. The stages so
+    /// far stay in the recording.
+    pub(crate) fn replace_model(&mut self, mut model: Accelerator) {
+        model.watch_after(&mut self.model);
         self.model = model;
     }
 

@@ -3,6 +3,32 @@
 use super::StepPhase;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 
+/// The solver of a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PassKind {
+    Contact,
+    Friction,
+}
+
+/// The solver of pass `number`, from 0, of a step with `contact` contact passes, and the number of the
+/// pass among its kind, from 1.
+pub(crate) fn pass_of(number: u32, contact: u32) -> (PassKind, u32) {
+    match number.checked_sub(contact) {
+        None => (PassKind::Contact, number + 1),
+        Some(number) => (PassKind::Friction, number + 1),
+    }
+}
+
+impl StepPhase {
+    /// The phase of pass `number`, from 0, of a step with `contact` contact passes.
+    pub(crate) fn of_pass(number: u32, contact: u32) -> Self {
+        match pass_of(number, contact) {
+            (PassKind::Contact, pass) => Self::Contact(pass),
+            (PassKind::Friction, pass) => Self::Friction(pass),
+        }
+    }
+}
+
 /// How often the collisions are streamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Streamed {
@@ -35,11 +61,10 @@ impl StepShape {
 
     /// The phase whose records a packet of a channel carries.
     pub(super) fn phase(&self, core: usize, packet: u32) -> Option<StepPhase> {
-        let passes = (0..self.rounds()).map(|pass| match pass.checked_sub(self.contact) {
-            // A step without contact passes, streamed once.
-            Some(_) if self.streamed == Streamed::Once => StepPhase::Contact(1),
-            Some(pass) => StepPhase::Friction(pass + 1),
-            None => StepPhase::Contact(pass + 1),
+        let passes = (0..self.rounds()).map(|pass| match self.streamed {
+            // All passes, even in a step without contact passes.
+            Streamed::Once => StepPhase::Contact(1),
+            Streamed::PerPass => StepPhase::of_pass(pass, self.contact),
         });
         let mut all = std::iter::once(StepPhase::Load).chain(passes).chain([StepPhase::Poses]);
         all.find(|phase| self.packet(core, *phase) == Some(packet))

@@ -6,7 +6,7 @@
 
 mod recorder;
 
-pub(crate) use recorder::{Recorder, StageCounts, StageLog};
+pub(crate) use recorder::{MovedBeats, Recorder, StageCounts, StageLog};
 
 use crate::fault::StepPhase;
 use crate::violation::RegisterAccess;
@@ -71,9 +71,9 @@ pub struct ChannelRecording {
     pub direction: Direction,
     /// The states of its stream port, each up to the next.
     pub port: Vec<PortState>,
-    /// The descriptors that have ended.
+    /// The descriptors that were fetched, in the order of time.
     pub descriptors: Vec<DescriptorSpan>,
-    /// The packets that have ended.
+    /// The packets that began, in the order of time.
     pub packets: Vec<PacketSpan>,
 }
 
@@ -118,7 +118,8 @@ impl PortState {
     }
 }
 
-/// A descriptor from its fetch to its status.
+/// A descriptor from its fetch to its status, or to the error, reset or end of the recording that cut
+/// it short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DescriptorSpan {
     /// Its time.
@@ -126,10 +127,13 @@ pub struct DescriptorSpan {
     /// Bus address of the descriptor.
     pub address: u64,
     /// Bytes that it moved.
-    pub bytes: u32,
+    pub bytes: u64,
+    /// Whether its status was written.
+    pub ended: bool,
 }
 
-/// A packet from its first beat to its last.
+/// A packet from its first beat to its last, or to the error, reset or end of the recording that cut it
+/// short. A packet that began before the recording is left out; its beats are states of the port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PacketSpan {
     /// Its time.
@@ -138,8 +142,10 @@ pub struct PacketSpan {
     pub phase: Option<StepPhase>,
     /// Its beats.
     pub beats: u64,
-    /// Descriptors that carried it.
+    /// Descriptors that carried it and have ended.
     pub descriptors: u32,
+    /// Whether it has its last beat.
+    pub ended: bool,
 }
 
 /// A stage of the accelerator's work.
@@ -172,4 +178,6 @@ pub struct StageSpan {
     pub waits: u64,
     /// Collisions that met a hazard.
     pub hazards: u64,
+    /// Whether the accelerator has ended it: no error, reset or end of the recording cut it short.
+    pub ended: bool,
 }

@@ -7,15 +7,37 @@ use super::{
 use crate::fault::StepPhase;
 use crate::violation::RegisterAccess;
 use pgs_interface::axi_dma::Direction;
+use pgs_interface::record::BEAT_BYTES;
+
+/// A descriptor under way.
+#[derive(Debug, Clone, Copy)]
+struct OpenDescriptor {
+    /// Clock of the fetch.
+    begin: u64,
+    address: u64,
+    /// Beats that it has moved.
+    beats: u64,
+}
+
+/// A packet under way.
+#[derive(Debug, Clone, Copy)]
+struct OpenPacket {
+    /// Clock of the first beat.
+    begin: u64,
+    phase: Option<StepPhase>,
+    beats: u64,
+    /// Descriptors of it that have ended.
+    descriptors: u32,
+    /// It began before the recording.
+    is_rest: bool,
+}
 
 /// The recording of a channel, and the descriptor and packet under way.
 #[derive(Debug)]
 struct Channel {
     recording: ChannelRecording,
-    /// Clock of the fetch, and address.
-    descriptor: Option<(u64, u64)>,
-    /// Clock of the first beat.
-    packet: Option<u64>,
+    descriptor: Option<OpenDescriptor>,
+    packet: Option<OpenPacket>,
 }
 
 impl Channel {
@@ -23,6 +45,36 @@ impl Channel {
     fn end_of_beats(&self) -> u64 {
         self.recording.port.last().map_or(0, PortState::end_of_beats)
     }
+
+    /// Ends what is under way, which will not end by itself.
+    fn cut_short(&mut self, now: u64) {
+        let end = now.max(self.end_of_beats());
+        if let Some(OpenDescriptor { begin, address, beats }) = self.descriptor.take() {
+            let span = Span { begin, end: end.max(begin) };
+            let bytes = beats * BEAT_BYTES as u64;
+            self.recording.descriptors.push(DescriptorSpan { span, address, bytes, ended: false });
+        }
+        let packet = self.packet.take().filter(|packet| !packet.is_rest);
+        if let Some(OpenPacket { begin, phase, beats, descriptors, .. }) = packet {
+            let span = Span { begin, end };
+            let packet = PacketSpan { span, phase, beats, descriptors, ended: false };
+            self.recording.packets.push(packet);
+        }
+    }
+}
+
+/// Beats that have moved without a pause.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MovedBeats {
+    pub(crate) beats: u64,
+    /// Clocks of each.
+    pub(crate) clocks: u64,
+    /// Whether the last one carries TLAST.
+    pub(crate) last: bool,
+    /// Beats of the same packet before them.
+    pub(crate) before: u64,
+    /// The phase whose records the packet carries.
+    pub(crate) phase: Option<StepPhase>,
 }
 
 /// A recording under way.
@@ -84,7 +136,7 @@ impl Recorder {
         self.accesses.push(access);
     }
 
-    /// The last access started something.
+    /// Notes that the access at this clock was a doorbell.
     pub(crate) fn doorbell(&mut self, now: u64) {
         self.doorbells.push(now);
     }
@@ -111,25 +163,33 @@ impl Recorder {
         self.sent_at = self.sent_at.max(now);
     }
 
-    /// Beats of a channel move, from a clock on, each for `clocks`.
+    /// Beats of a channel move, from a clock on, each for a number of clocks.
     pub(crate) fn moves(
         &mut self,
         (core, direction): (usize, Direction),
         begin: u64,
-        (beats, clocks): (u64, u64),
-        last: bool,
+        moved: &MovedBeats,
     ) {
+        let MovedBeats { beats, clocks, last, before, phase } = *moved;
         let exists = if direction == Direction::S2mm { self.sent_at } else { 0 };
-        let Channel { recording: ChannelRecording { port, .. }, packet, .. } =
+        let Channel { recording: ChannelRecording { port, .. }, packet, descriptor } =
             self.channel(core, direction);
         let begin = begin.max(exists).max(port.last().map_or(0, PortState::end_of_beats));
-        packet.get_or_insert(begin);
+        let goes_on = packet.is_some();
+        let is_rest = before > 0;
+        packet
+            .get_or_insert(OpenPacket { begin, phase, beats: 0, descriptors: 0, is_rest })
+            .beats += beats;
+        if let Some(descriptor) = descriptor {
+            descriptor.beats += beats;
+        }
         // A rest of no clocks was none.
         port.pop_if(|state| state.begin >= begin && matches!(state.port, Port::Rests { .. }));
         if let Some(PortState {
             begin: since,
             port: Port::Moves { beats: before, clocks: each, last: ended },
         }) = port.last_mut()
+            && goes_on
             && *since + *before * *each == begin
             && *each == clocks
             && !*ended
@@ -139,6 +199,12 @@ impl Recorder {
             return;
         }
         port.push(PortState { begin, port: Port::Moves { beats, clocks, last } });
+    }
+
+    /// A channel drops what is under way: it has failed, or stops, or its core is reset.
+    pub(crate) fn abandons(&mut self, (core, direction): (usize, Direction), now: u64) {
+        self.channel(core, direction).cut_short(now);
+        self.rests((core, direction), now, [false, false]);
     }
 
     /// No beat of a channel moves from a clock on.
@@ -165,7 +231,7 @@ impl Recorder {
     ) {
         let channel = self.channel(core, direction);
         let before = channel.recording.descriptors.last().map_or(0, |last| last.span.end);
-        channel.descriptor = Some((now.max(before), address));
+        channel.descriptor = Some(OpenDescriptor { begin: now.max(before), address, beats: 0 });
     }
 
     pub(crate) fn descriptor_ends(
@@ -175,31 +241,37 @@ impl Recorder {
         bytes: u32,
     ) {
         let channel = self.channel(core, direction);
-        if let Some((begin, address)) = channel.descriptor.take() {
+        if let Some(OpenDescriptor { begin, address, .. }) = channel.descriptor.take() {
             let span = Span { begin, end: now.max(channel.end_of_beats()) };
-            channel.recording.descriptors.push(DescriptorSpan { span, address, bytes });
+            let bytes = bytes.into();
+            channel.recording.descriptors.push(DescriptorSpan {
+                span,
+                address,
+                bytes,
+                ended: true,
+            });
+        }
+        if let Some(packet) = &mut channel.packet {
+            packet.descriptors += 1;
         }
     }
 
-    pub(crate) fn packet_ends(
-        &mut self,
-        (core, direction): (usize, Direction),
-        now: u64,
-        phase: Option<StepPhase>,
-        (beats, descriptors): (u64, u32),
-    ) {
+    pub(crate) fn packet_ends(&mut self, (core, direction): (usize, Direction), now: u64) {
         let channel = self.channel(core, direction);
-        if let Some(begin) = channel.packet.take() {
+        let packet = channel.packet.take().filter(|packet| !packet.is_rest);
+        if let Some(OpenPacket { begin, phase, beats, descriptors, .. }) = packet {
             let span = Span { begin, end: now.max(channel.end_of_beats()) };
-            channel.recording.packets.push(PacketSpan { span, phase, beats, descriptors });
+            let packet = PacketSpan { span, phase, beats, descriptors, ended: true };
+            channel.recording.packets.push(packet);
         }
     }
 
     /// The recording up to a clock, with the stages of the accelerator.
-    pub(crate) fn finish(self, now: u64, stages: Vec<StageSpan>) -> Recording {
+    pub(crate) fn finish(mut self, now: u64, stages: Vec<StageSpan>) -> Recording {
         // A narrow beat under way ends after the board's clock.
         let beats = self.channels.iter().filter_map(|channel| channel.recording.port.last());
         let end = beats.map(PortState::end_of_beats).fold(now, u64::max);
+        self.channels.iter_mut().for_each(|channel| channel.cut_short(end));
         let mut channels: Vec<_> =
             self.channels.into_iter().map(|channel| channel.recording).collect();
         channels.sort_by_key(|channel| channel.direction == Direction::S2mm);
@@ -237,6 +309,11 @@ pub(crate) struct StageLog {
 }
 
 impl StageLog {
+    /// A log from now on; `clock` clocks of a step have passed.
+    pub(crate) fn new(now: u64, clock: u64) -> Self {
+        Self { start: now.saturating_sub(clock), ..Self::default() }
+    }
+
     /// A step begins at a clock of the board.
     pub(crate) fn begin_step(&mut self, now: u64) {
         self.start = now;
@@ -247,17 +324,25 @@ impl StageLog {
         if self.current.map(|(current, ..)| current) == stage {
             return;
         }
-        let now = self.start + clock;
-        if let Some((stage, begin, before)) = self.current.take() {
-            self.ended.push(StageSpan {
-                stage,
-                span: Span { begin, end: now },
-                stalls: counts.stalls - before.stalls,
-                waits: counts.waits - before.waits,
-                hazards: counts.hazards - before.hazards,
-            });
-        }
-        self.current = stage.map(|stage| (stage, now, counts));
+        self.close(clock, counts, true);
+        self.current = stage.map(|stage| (stage, self.start + clock, counts));
+    }
+
+    /// The stage under way ends with an error, a reset or the recording.
+    pub(crate) fn cut_short(&mut self, clock: u64, counts: StageCounts) {
+        self.close(clock, counts, false);
+    }
+
+    fn close(&mut self, clock: u64, counts: StageCounts, ended: bool) {
+        let Some((stage, begin, before)) = self.current.take() else { return };
+        self.ended.push(StageSpan {
+            stage,
+            span: Span { begin, end: self.start + clock },
+            stalls: counts.stalls - before.stalls,
+            waits: counts.waits - before.waits,
+            hazards: counts.hazards - before.hazards,
+            ended,
+        });
     }
 
     /// The accelerator sends, `clock` clocks after the start of the step.
@@ -270,7 +355,7 @@ impl StageLog {
         self.sent_at
     }
 
-    /// The stages that have ended.
+    /// The stages so far.
     pub(crate) fn finish(self) -> Vec<StageSpan> {
         self.ended
     }

@@ -1,14 +1,18 @@
 //! A recording tells the course of a step to the clock, and changes nothing of it.
 
-use bitstream_model::recording::{ChannelRecording, Port, Recording, Span, Stage};
+use bitstream_model::recording::{
+    ChannelRecording, PacketSpan, Port, PortState, Recording, Span, Stage,
+};
 use bitstream_model::{
     Bandwidth, BoardConfig, Counts, Delays, Direction, Fault, FaultKind, PacketCount, StepPhase,
     When,
 };
 use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
 
+use crate::common::microseconds;
+use crate::common::packing::beats_out;
 use crate::common::scene::Step;
-use crate::common::sg::{Failure, Machine};
+use crate::common::sg::{Failure, Flight, LONG, Machine};
 use crate::common::shortcuts::{OTHERS, Visible, scene, visible};
 
 /// A step of a board of its own.
@@ -107,7 +111,7 @@ fn the_packets_have_the_beats_and_descriptors_that_the_board_counts() {
             assert_eq!(beats_of(channel, span), [beats, counted.len() as u64]);
             let descriptors: u32 = counted.iter().map(|(.., descriptors)| descriptors).sum();
             assert_eq!(channel.descriptors.len(), descriptors as usize);
-            let bytes: u64 = channel.descriptors.iter().map(|one| u64::from(one.bytes)).sum();
+            let bytes: u64 = channel.descriptors.iter().map(|one| one.bytes).sum();
             assert_eq!(bytes, 16 * beats);
             let ends = channel.packets.windows(2).all(|two| two[0].span.end <= two[1].span.begin);
             assert!(ends, "{:?}", channel.packets);
@@ -189,8 +193,138 @@ fn a_step_that_fails_is_recorded_to_its_end() {
     machine.step(&small()).expect_err("the fault");
     let recording = machine.host.board.take_recording().expect("it was recorded");
     let faulty = &recording.channels[2];
-    assert_eq!((faulty.core, faulty.packets.len()), (2, 2), "velocities and one pass");
-    let stages: Vec<_> = recording.stages.iter().map(|stage| stage.stage).collect();
-    // The channel runs ahead of the accelerator, which still loads.
-    assert_eq!(stages, [Stage::Load]);
+    assert_eq!(faulty.core, 2);
+    let found: Vec<_> = faulty.packets.iter().map(|packet| (packet.phase, packet.ended)).collect();
+    let phases = [StepPhase::Load, StepPhase::Contact(1), StepPhase::Contact(2)].map(Some);
+    assert_eq!(found, phases.into_iter().zip([true, true, false]).collect::<Vec<_>>());
+    assert_eq!(faulty.packets[2].beats, 17);
+    let descriptor = faulty.descriptors.last().expect("three packets");
+    assert_eq!((descriptor.ended, descriptor.bytes), (false, 17 * 16));
+    let stages: Vec<_> = recording.stages.iter().map(|stage| (stage.stage, stage.ended)).collect();
+    // The channel runs ahead of the accelerator.
+    assert_eq!(stages, [(Stage::Load, true), (Stage::Contact(1), false)]);
+    assert_packets_have_their_beats(&recording);
+}
+
+/// Asserts that the beats of the ports within each packet are the packet's, and that no packet begins before
+/// the last one has ended.
+fn assert_packets_have_their_beats(recording: &Recording) {
+    for channel in &recording.channels {
+        let mut at = recording.span.begin;
+        for packet in &channel.packets {
+            assert!(packet.span.begin >= at, "{packet:?} begins before {at}");
+            at = packet.span.end;
+            let beats = channel.port.iter().filter_map(|state| match state.port {
+                Port::Moves { beats, .. } if state.begin >= packet.span.begin => {
+                    (state.end_of_beats() <= packet.span.end).then_some(beats)
+                }
+                _ => None,
+            });
+            assert_eq!(beats.sum::<u64>(), packet.beats, "{packet:?}");
+        }
+        assert!(at <= recording.span.end);
+    }
+}
+
+#[test]
+fn a_step_after_one_that_fails_has_packets_of_its_own() {
+    let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
+    let mut machine = Machine::new(config);
+    let fault = Fault::new(FaultKind::DmaDecErr).on(2, Direction::Mm2s);
+    machine.host.board.inject(fault.in_phase(StepPhase::Contact(2)).when(When::Beat(17)));
+    machine.host.board.record();
+    machine.step(&small()).expect_err("the fault");
+    let failed = machine.host.board.counts().cycles;
+    machine.recover();
+    let recovered = machine.host.board.counts().cycles;
+    machine.step(&small()).expect("no other fault");
+    let packets = machine.host.board.packets();
+    let recording = machine.host.board.take_recording().expect("it was recorded");
+    assert_packets_have_their_beats(&recording);
+    for channel in &recording.channels {
+        // Whatever the error left behind ends with the reset, on each channel.
+        let later = |packet: &&PacketSpan| packet.span.begin >= recovered;
+        let [before, after]: [Vec<_>; 2] =
+            [false, true].map(|is| channel.packets.iter().filter(|one| later(one) == is).collect());
+        assert!(before.iter().all(|packet| packet.span.end <= recovered), "{before:?}");
+        let counted: Vec<_> = packets
+            .iter()
+            .filter(|one| (one.core, one.direction) == (channel.core, channel.direction))
+            .map(|one| (one.phase, one.beats, one.descriptors, true))
+            .collect();
+        let found: Vec<_> =
+            after.iter().map(|one| (one.phase, one.beats, one.descriptors, one.ended)).collect();
+        assert_eq!(found, counted);
+        // In the reset neither side is ready.
+        let silent = Port::Rests { valid: false, ready: false };
+        let in_reset = |state: &&PortState| (failed..recovered).contains(&state.begin);
+        assert!(channel.port.iter().filter(in_reset).any(|state| state.port == silent));
+    }
+}
+
+/// A recorded step; one that is recorded late has been under way for some time.
+fn take_late(late: bool, step: &Step) -> Recording {
+    let mut machine = Machine::new(board(&FLOAT, Bandwidth::ZCU102_SUSTAINED));
+    machine.step(step).expect("a step without a fault");
+    if !late {
+        machine.host.board.record();
+    }
+    step.write_arguments(&machine.host);
+    let variant = machine.host.variant();
+    let mut flight = Flight::of(step);
+    machine.arm(&mut flight, &beats_out(&variant, step));
+    machine.start();
+    machine.send(&mut flight, &step.packed(&variant));
+    machine.host.port.pause(microseconds(3));
+    if late {
+        machine.host.board.record();
+    }
+    machine.wait(&flight, LONG).expect("no fault");
+    assert!(machine.is_done());
+    let recording = machine.host.board.take_recording().expect("it was recorded");
+    machine.collect(&flight, step.bodies.len());
+    recording
+}
+
+#[test]
+fn a_recording_that_begins_within_a_step_has_the_clocks_of_the_whole() {
+    let [whole, late] = [false, true].map(|late| take_late(late, &small()));
+    let begin = late.span.begin;
+    assert!(begin > whole.span.begin);
+    assert_eq!(late.span.end, whole.span.end);
+    let [first, others @ ..] = late.stages.as_slice() else { panic!("no stage") };
+    let place = whole.stages.len() - late.stages.len();
+    assert_eq!(*others, whole.stages[place + 1..]);
+    assert!(place > 0, "the step was under way: {first:?}");
+    let same = &whole.stages[place];
+    assert_eq!((first.stage, first.span.end), (same.stage, same.span.end));
+    assert!(first.span.begin >= begin && same.span.begin < begin, "{first:?} of {same:?}");
+    for (late, whole) in late.channels.iter().zip(&whole.channels) {
+        let later: Vec<_> =
+            whole.packets.iter().filter(|one| one.span.begin >= begin).copied().collect();
+        assert_eq!(late.packets, later);
+    }
+    let cut = |channel: &ChannelRecording| {
+        channel.packets.iter().any(|one| one.span.begin < begin && one.span.end > begin)
+    };
+    assert!(whole.channels.iter().any(cut), "no packet was under way");
+}
+
+#[test]
+fn the_stages_before_another_bitstream_stay_in_the_recording() {
+    let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
+    let mut machine = Machine::new(config);
+    let fault = Fault::new(FaultKind::OtherBitstream { identification: 7 });
+    let fault = fault.on(2, Direction::Mm2s).in_phase(StepPhase::Friction(3));
+    machine.host.board.inject(fault.when(When::Beat(17)));
+    machine.host.board.record();
+    machine.step(&small()).expect_err("another bitstream");
+    let recording = machine.host.board.take_recording().expect("it was recorded");
+    let (last, others) = recording.stages.split_last().expect("stages");
+    assert!(!last.ended, "{last:?}");
+    assert_eq!(others.first().map(|stage| stage.stage), Some(Stage::Load));
+    assert!(others.len() > 2 && others.iter().all(|stage| stage.ended), "{others:?}");
+    let cut = recording.channels[2].packets.last().expect("packets");
+    assert_eq!((cut.phase, cut.beats, cut.ended), (Some(StepPhase::Friction(3)), 17, false));
+    assert_packets_have_their_beats(&recording);
 }

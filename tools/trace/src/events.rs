@@ -112,10 +112,7 @@ impl TracedStep<'_> {
 
     fn access_events(&self, events: &mut Vec<Value>) {
         for access in &self.recording.accesses {
-            let arrow = if access.write { "<-" } else { "->" };
-            let name = format!("{} {arrow} {:#x}", names::register(access.address), access.value);
-            let begin = access.cycle.saturating_sub(self.recording.access_clocks);
-            let span = Span { begin: begin.max(self.recording.span.begin), end: access.cycle };
+            let (name, span) = (names::access(access), self.span_of(access));
             let arguments = json!({
                 "address": format!("{:#x}", access.address),
                 "value": format!("{:#x}", access.value),
@@ -127,23 +124,48 @@ impl TracedStep<'_> {
     }
 
     fn channel_events(&self, first: usize, channel: &ChannelRecording, events: &mut Vec<Value>) {
+        let thread = first + PACKETS;
         let mut port = channel.port.as_slice();
         for packet in &channel.packets {
-            let arguments = json!({ "beats": packet.beats, "descriptors": packet.descriptors });
+            let arguments = json!({
+                "beats": packet.beats,
+                "descriptors": packet.descriptors,
+                "ended": packet.ended,
+            });
             let name = names::packet(packet.phase);
-            events.push(self.on_board(first + PACKETS, &name, packet.span, arguments));
-            port = self.port_events(first + PACKETS, (channel.direction, packet), port, events);
+            port = self.beats_outside(thread, port, packet.span.begin, events);
+            events.push(self.on_board(thread, &name, packet.span, arguments));
+            port = self.port_events(thread, (channel.direction, packet), port, events);
         }
+        self.beats_outside(thread, port, u64::MAX, events);
         for descriptor in &channel.descriptors {
-            let address = format!("{:#x}", descriptor.address);
-            let arguments = json!({ "address": address, "bytes": descriptor.bytes });
-            events.push(self.on_board(
-                first + DESCRIPTORS,
-                "descriptor",
-                descriptor.span,
-                arguments,
-            ));
+            let arguments = json!({
+                "address": format!("{:#x}", descriptor.address),
+                "bytes": descriptor.bytes,
+                "ended": descriptor.ended,
+            });
+            let thread = first + DESCRIPTORS;
+            events.push(self.on_board(thread, "descriptor", descriptor.span, arguments));
         }
+    }
+
+    /// The beats before the next packet, of a packet that began before the recording; returns the later
+    /// states.
+    fn beats_outside<'a>(
+        &self,
+        thread: usize,
+        port: &'a [PortState],
+        packet: u64,
+        events: &mut Vec<Value>,
+    ) -> &'a [PortState] {
+        let (outside, rest) = port.split_at(port.partition_point(|state| state.begin < packet));
+        for state in outside {
+            if let Port::Moves { beats, .. } = state.port {
+                let span = Span { begin: state.begin, end: state.end_of_beats() };
+                events.push(self.on_board(thread, "beats", span, json!({ "beats": beats })));
+            }
+        }
+        rest
     }
 
     /// The states of a port within a packet; returns the later ones.
@@ -159,9 +181,6 @@ impl TracedStep<'_> {
                 break;
             }
             port = rest;
-            if state.begin < packet.span.begin {
-                continue;
-            }
             let next = rest.first().map_or(packet.span.end, |next| next.begin);
             let (name, arguments) = match (state.port, direction) {
                 (Port::Moves { beats, .. }, _) => ("beats", json!({ "beats": beats })),
@@ -181,6 +200,7 @@ impl TracedStep<'_> {
                 "stalls": stage.stalls,
                 "waits": stage.waits,
                 "hazards": stage.hazards,
+                "ended": stage.ended,
             });
             let name = names::stage(stage.stage);
             events.push(self.on_board(ACCELERATOR, &name, stage.span, arguments));

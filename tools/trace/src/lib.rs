@@ -11,7 +11,8 @@ mod svg;
 mod timeline;
 mod vcd;
 
-use bitstream_model::recording::Recording;
+use bitstream_model::RegisterAccess;
+use bitstream_model::recording::{Recording, Span};
 use zynq_pgs::StepReport;
 
 pub use events::SCHEMA;
@@ -23,7 +24,7 @@ pub struct TracedStep<'a> {
     pub recording: &'a Recording,
     /// The name of the board's design.
     pub design: &'a str,
-    /// The driver's report, unless the step failed.
+    /// The driver's report, unless the step failed or was interrupted.
     pub report: Option<&'a StepReport>,
 }
 
@@ -31,6 +32,12 @@ impl TracedStep<'_> {
     /// Nanoseconds of a number of clocks.
     fn nanoseconds(&self, clocks: u64) -> f64 {
         clocks as f64 * 1e6 / f64::from(self.recording.clock_khz)
+    }
+
+    /// The clocks of a register access, which ends with its clock.
+    fn span_of(&self, access: &RegisterAccess) -> Span {
+        let begin = access.cycle.saturating_sub(self.recording.access_clocks);
+        Span { begin: begin.max(self.recording.span.begin), end: access.cycle }
     }
 
     /// The clock's frequency in MHz.

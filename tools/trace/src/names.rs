@@ -5,7 +5,7 @@ use bitstream_model::interface::axi_dma::{CHANNEL_REGISTERS, S2MM_OFFSET};
 use bitstream_model::interface::control::{REGISTERS, SHAPE_TABLE};
 use bitstream_model::interface::register::Register;
 use bitstream_model::recording::{ChannelRecording, Stage};
-use bitstream_model::{Direction, StepPhase};
+use bitstream_model::{Direction, RegisterAccess, StepPhase};
 
 /// The name of a channel, in small letters: `mm2s0`.
 pub(crate) fn channel_scope(channel: &ChannelRecording) -> String {
@@ -52,6 +52,12 @@ pub(crate) fn register(address: u64) -> String {
         Some(name) => format!("dma{core} {} {name}", direction(half)),
         None => unknown(),
     }
+}
+
+/// A register access, with its value: `dma0 MM2S TAILDESC <- 0x40`.
+pub(crate) fn access(access: &RegisterAccess) -> String {
+    let arrow = if access.write { "<-" } else { "->" };
+    format!("{} {arrow} {:#x}", register(access.address), access.value)
 }
 
 /// The name of a stage of the accelerator.

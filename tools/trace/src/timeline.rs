@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use bitstream_model::estimate::a53_copy_seconds;
 use bitstream_model::interface::record::BEAT_BYTES;
-use bitstream_model::recording::{ChannelRecording, PacketSpan, Span, Stage};
+use bitstream_model::recording::{ChannelRecording, Span, Stage};
 use bitstream_model::{Direction, StepPhase};
 
 use crate::svg::{Anchor, Picture};
@@ -54,7 +54,8 @@ impl Scale {
 
     /// The place of a time from the begin of the picture, ns.
     fn place(&self, nanoseconds: f64) -> f64 {
-        LEFT + (RIGHT - LEFT) * nanoseconds / self.whole()
+        let whole = self.whole();
+        if whole > 0.0 { LEFT + (RIGHT - LEFT) * nanoseconds / whole } else { LEFT }
     }
 }
 
@@ -79,7 +80,7 @@ fn packet_class(phase: Option<StepPhase>) -> &'static str {
     }
 }
 
-/// What is left of a name where it has no room: its last word, the number of a pass.
+/// The last word of a name, for a box with no room for all of it.
 fn short(name: &str) -> &str {
     name.rsplit(' ').next().unwrap_or(name)
 }
@@ -106,7 +107,7 @@ impl TracedStep<'_> {
         }
         lane(&mut picture, y, HEIGHT, "interrupt");
         for span in self.high() {
-            self.draw_span(&mut picture, &scale, (y, HEIGHT), ("irq", "interrupt"), span);
+            self.draw_span(&mut picture, &scale, (y, HEIGHT), ("irq", "interrupt"), (span, true));
         }
         y += HEIGHT + GAP;
         y = axis(&mut picture, &scale, y);
@@ -124,45 +125,71 @@ impl TracedStep<'_> {
                 " of {} bodies and {} collisions, {} passes",
                 report.bodies, report.collisions, report.passes
             ),
-            None => " that failed".to_owned(),
+            None => " that did not end".to_owned(),
         };
         format!("One step{of}, on design {}", self.design)
     }
 
-    fn notes(&self) -> [String; 2] {
-        let clocks = self.recording.stages.iter().map(|stage| stage.span.clocks()).sum::<u64>();
-        let stalls: u64 = self.recording.stages.iter().map(|stage| stage.stalls).sum();
-        let waits: u64 = self.recording.stages.iter().map(|stage| stage.waits).sum();
-        [
-            format!(
-                "Board: modelled, {} MHz. Accelerator: {clocks} clocks, {stalls} of them stalls and {waits} waits.",
-                self.megahertz()
-            ),
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!("Board: modelled, {} MHz.", self.megahertz())];
+        if let Some(work) = self.work() {
+            notes[0] += &work;
+        }
+        let attempts = self.report.map_or(0, |report| report.retries);
+        if attempts > 0 {
+            notes.push(format!("The driver repeated the step: attempt {} ended.", attempts + 1));
+        }
+        notes.push(
             "CPU: an A53 on paper, which copies the step's bytes on one core; checks are left out."
                 .to_owned(),
-        ]
+        );
+        notes
     }
 
-    /// The bytes of the packets that `of` selects.
-    fn bytes(&self, of: impl Fn(&PacketSpan) -> bool) -> u64 {
+    /// The clocks of the accelerator: of the whole step as its counters say, or of the stages that the
+    /// recording has.
+    fn work(&self) -> Option<String> {
+        let stages = || self.recording.stages.iter();
+        let [clocks, stalls, waits] = match self.report.map(|report| &report.cycles) {
+            Some(cycles) => [cycles.total, cycles.stalls, cycles.waits],
+            None if self.recording.stages.is_empty() => return None,
+            None => [
+                stages().map(|stage| stage.span.clocks()).sum(),
+                stages().map(|stage| stage.stalls).sum(),
+                stages().map(|stage| stage.waits).sum(),
+            ],
+        };
+        Some(format!(" Accelerator: {clocks} clocks, {stalls} of them stalls and {waits} waits."))
+    }
+
+    /// The bytes of a phase's packets. A step that is repeated sends the same buffers again.
+    fn bytes(&self, phase: StepPhase) -> u64 {
+        let of_channel = |channel: &ChannelRecording| {
+            let packets = channel.packets.iter().filter(|packet| packet.phase == Some(phase));
+            packets.map(|packet| packet.beats).max().unwrap_or(0)
+        };
+        self.recording.channels.iter().map(of_channel).sum::<u64>() * BEAT_BYTES as u64
+    }
+
+    /// The phase of the first packet with collisions.
+    fn first_pass(&self) -> Option<StepPhase> {
         let packets = self.recording.channels.iter().flat_map(|channel| &channel.packets);
-        packets.filter(|packet| of(packet)).map(|packet| packet.beats).sum::<u64>()
-            * BEAT_BYTES as u64
+        packets
+            .filter_map(|packet| match packet.phase? {
+                phase @ (StepPhase::Contact(_) | StepPhase::Friction(_)) => {
+                    Some((packet.span.begin, phase))
+                }
+                _ => None,
+            })
+            .min_by_key(|(begin, _)| *begin)
+            .map(|(_, phase)| phase)
     }
 
     fn scale(&self) -> Scale {
         // All passes read one buffer, which the CPU writes once.
-        let first = self.recording.stages.iter().find_map(|stage| match stage.stage {
-            Stage::Contact(pass) => Some(StepPhase::Contact(pass)),
-            Stage::Friction(pass) => Some(StepPhase::Friction(pass)),
-            Stage::Window => Some(StepPhase::Contact(1)),
-            _ => None,
-        });
-        let written = self.bytes(|packet| match packet.phase {
-            Some(StepPhase::Load | StepPhase::Poses) => true,
-            phase => phase.is_some() && phase == first,
-        });
-        let read = self.bytes(|packet| packet.phase == Some(StepPhase::Results));
+        let written = [Some(StepPhase::Load), self.first_pass(), Some(StepPhase::Poses)];
+        let written = written.into_iter().flatten().map(|phase| self.bytes(phase)).sum();
+        let read = self.bytes(StepPhase::Results);
         Scale {
             pack: a53_copy_seconds(written) * 1e9,
             unpack: a53_copy_seconds(read) * 1e9,
@@ -183,11 +210,12 @@ impl TracedStep<'_> {
         scale: &Scale,
         (y, height): (f64, f64),
         (class, name): (&str, &str),
-        span: Span,
+        (span, ended): (Span, bool),
     ) {
         let x = self.place(scale, span.begin);
         let width = (self.place(scale, span.end) - x).max(NARROWEST);
-        let title = format!("{name}: clocks {} to {}", span.begin, span.end);
+        let cut = if ended { "" } else { ", cut short" };
+        let title = format!("{name}: clocks {} to {}{cut}", span.begin, span.end);
         // Neighbours stay apart.
         picture.rectangle(class, [x, y, (width - 0.5).max(NARROWEST), height], Some(&title));
         picture.label([x, y, width, height], &[name, short(name)]);
@@ -203,16 +231,12 @@ impl TracedStep<'_> {
         picture.label([begin, TOP, board - begin, CPU_HEIGHT], &["pack"]);
         let below = TOP + CPU_HEIGHT + 14.0;
         picture.text("s", [RIGHT, below], Anchor::End, "unpack");
-        // A register access ends with its clock.
         for access in &self.recording.accesses {
-            let begin = access.cycle.saturating_sub(self.recording.access_clocks);
-            let span = Span { begin: begin.max(self.recording.span.begin), end: access.cycle };
+            let span = self.span_of(access);
             let x = self.place(scale, span.begin);
             let width = self.place(scale, span.end) - x - 0.2;
             let place = [x, TOP + CPU_HEIGHT - 10.0, width.max(0.3), 10.0];
-            let arrow = if access.write { "<-" } else { "->" };
-            let title = format!("{} {arrow} {:#x}", names::register(access.address), access.value);
-            picture.rectangle("cpu", place, Some(&title));
+            picture.rectangle("cpu", place, Some(&names::access(access)));
         }
         for bell in &self.recording.doorbells {
             let x = self.place(scale, *bell);
@@ -235,7 +259,13 @@ impl TracedStep<'_> {
         for packet in &channel.packets {
             let name = names::packet(packet.phase);
             let class = packet_class(packet.phase);
-            self.draw_span(picture, scale, (y, HEIGHT), (class, &name), packet.span);
+            self.draw_span(
+                picture,
+                scale,
+                (y, HEIGHT),
+                (class, &name),
+                (packet.span, packet.ended),
+            );
         }
     }
 
@@ -247,7 +277,13 @@ impl TracedStep<'_> {
         for stage in &self.recording.stages {
             let name = names::stage(stage.stage);
             let class = stage_class(stage.stage);
-            self.draw_span(picture, scale, (y, CPU_HEIGHT), (class, &name), stage.span);
+            self.draw_span(
+                picture,
+                scale,
+                (y, CPU_HEIGHT),
+                (class, &name),
+                (stage.span, stage.ended),
+            );
         }
         for wait in &self.recording.waits {
             let (from, to) = (self.place(scale, wait.begin), self.place(scale, wait.end));

@@ -12,9 +12,8 @@ use crate::{TracedStep, names};
 
 /// Bits of a physical address.
 const ADDRESS_BITS: usize = 40;
-/// Letters of a register's name, and of a stage's.
-const REGISTER_LETTERS: usize = 24;
-const STAGE_LETTERS: usize = 12;
+/// The stage of an accelerator that has none.
+const IDLE: &str = "idle";
 
 /// A signal of the dump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,10 +41,15 @@ fn bits(value: u64, width: usize) -> String {
     format!("{value:0width$b}")
 }
 
-/// The bits of a text, which ends at the lowest bit.
+/// The bits of a text, which ends at the lowest bit of a vector for the longest text.
 fn ascii(text: &str, letters: usize) -> String {
-    let padded = format!("{text:>letters$.letters$}");
+    let padded = format!("{text:>letters$}");
     padded.bytes().map(|byte| format!("{byte:08b}")).collect()
+}
+
+/// The letters of the longest text, one at least.
+fn longest(texts: &[(u64, String)]) -> usize {
+    texts.iter().map(|(_, text)| text.len()).fold(1, usize::max)
 }
 
 /// The declarations, and the changes at each clock.
@@ -81,6 +85,15 @@ impl Dump {
         self.change(clock, signal, String::from(if level { "1" } else { "0" }));
     }
 
+    /// A vector with room for each of these texts, which it has from a clock on.
+    fn texts(&mut self, name: &str, texts: &[(u64, String)]) {
+        let letters = longest(texts);
+        let signal = self.signal(name, 8 * letters);
+        for (clock, text) in texts {
+            self.change(*clock, signal, ascii(text, letters));
+        }
+    }
+
     fn number(&mut self, clock: u64, signal: Signal, value: u64) {
         let bits = bits(value, self.widths[signal.0]);
         self.change(clock, signal, bits);
@@ -110,7 +123,10 @@ impl TracedStep<'_> {
         let [read, write, doorbell] =
             ["read", "write", "doorbell"].map(|name| dump.signal(name, 1));
         let (address, data) = (dump.signal("address", ADDRESS_BITS), dump.signal("data", 32));
-        let name = dump.signal("register", 8 * REGISTER_LETTERS);
+        let accesses = self.recording.accesses.iter();
+        let names: Vec<_> =
+            accesses.map(|access| (access.cycle, names::register(access.address))).collect();
+        dump.texts("register", &names);
         for (number, access) in (1..).zip(&self.recording.accesses) {
             // A pulse of one clock; accesses in adjacent clocks tell apart by their number.
             let kind = if access.write { write } else { read };
@@ -121,8 +137,6 @@ impl TracedStep<'_> {
             dump.number(access.cycle, count, number);
             dump.number(access.cycle, address, access.address);
             dump.number(access.cycle, data, access.value.into());
-            let text = ascii(&names::register(access.address), REGISTER_LETTERS);
-            dump.change(access.cycle, name, text);
         }
         for clock in &self.recording.doorbells {
             dump.level(*clock, doorbell, true);
@@ -132,15 +146,15 @@ impl TracedStep<'_> {
 
     fn accelerator_signals(&self, dump: &mut Dump) {
         let (busy, waits) = (dump.signal("busy", 1), dump.signal("waits", 1));
-        let stage = dump.signal("stage", 8 * STAGE_LETTERS);
-        dump.change(self.recording.span.begin, stage, ascii("idle", STAGE_LETTERS));
+        let mut stages = vec![(self.recording.span.begin, IDLE.to_owned())];
         for one in &self.recording.stages {
             dump.level(one.span.begin, busy, true);
-            dump.change(one.span.begin, stage, ascii(&names::stage(one.stage), STAGE_LETTERS));
+            stages.push((one.span.begin, names::stage(one.stage)));
             // The next stage, if one follows at once, replaces this.
             dump.level(one.span.end, busy, false);
-            dump.change(one.span.end, stage, ascii("idle", STAGE_LETTERS));
+            stages.push((one.span.end, IDLE.to_owned()));
         }
+        dump.texts("stage", &stages);
         for wait in &self.recording.waits {
             dump.level(wait.begin, waits, true);
             dump.level(wait.end, waits, false);
@@ -242,10 +256,12 @@ fn stream_signals(dump: &mut Dump, channel: &ChannelRecording) {
             }
         }
     }
-    for (number, packet) in (1..).zip(&channel.packets) {
+    let ended = channel.packets.iter().filter(|packet| packet.ended);
+    for (number, packet) in (1..).zip(ended) {
         dump.number(packet.span.end, packets, number);
     }
-    for (number, descriptor) in (1..).zip(&channel.descriptors) {
+    let ended = channel.descriptors.iter().filter(|descriptor| descriptor.ended);
+    for (number, descriptor) in (1..).zip(ended) {
         dump.number(descriptor.span.end, descriptors, number);
     }
 }
@@ -253,6 +269,8 @@ fn stream_signals(dump: &mut Dump, channel: &ChannelRecording) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bitstream_model::interface::address_map::CONTROL_BASE;
+    use bitstream_model::interface::control::REGISTERS;
 
     #[test]
     fn identifiers_are_short_and_differ() {
@@ -263,9 +281,29 @@ mod tests {
     }
 
     #[test]
-    fn a_text_is_cut_to_its_vector_and_ends_at_its_lowest_bit() {
+    fn a_text_ends_at_the_lowest_bit_of_its_vector() {
         assert_eq!(ascii("ab", 2), "0110000101100010");
         assert_eq!(ascii("ab", 3), format!("00100000{}", ascii("ab", 2)));
-        assert_eq!(ascii("abc", 2), ascii("ab", 2));
+    }
+
+    #[test]
+    fn every_register_has_its_whole_name() {
+        let texts: Vec<_> = REGISTERS
+            .iter()
+            .map(|row| (7, names::register(CONTROL_BASE + u64::from(row.offset))))
+            .chain([(7, "a".to_owned())])
+            .collect();
+        let letters = longest(&texts);
+        for (row, (_, text)) in REGISTERS.iter().zip(&texts) {
+            assert_eq!(*text, format!("control {}", row.name));
+            let bits = ascii(text, letters);
+            assert_eq!(bits.len(), 8 * letters);
+            let byte = |at: usize| u8::from_str_radix(&bits[at..at + 8], 2).expect("bits");
+            let read: Vec<u8> = (0..letters).map(|letter| byte(8 * letter)).collect();
+            assert_eq!(String::from_utf8(read).expect("letters").trim_start(), text);
+        }
+        let mut dump = Dump::default();
+        dump.texts("register", &texts);
+        assert_eq!(dump.widths, [8 * letters]);
     }
 }

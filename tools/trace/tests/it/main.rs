@@ -6,6 +6,7 @@ mod schema;
 mod step;
 
 use bitstream_model::interface::profile::{FLOAT, HALF, WINDOWED};
+use bitstream_model::recording::{Levels, Span};
 use bitstream_model::{BoardConfig, FaultKind};
 
 use step::Taken;
@@ -38,8 +39,28 @@ fn a_step_that_fails_has_files_too() {
     taken.traced().write_events(&mut events).expect("a vector takes all");
     taken.traced().write_timeline(&mut picture).expect("a vector takes all");
     let picture = String::from_utf8(picture).expect("text");
-    assert!(picture.contains("One step that failed"), "{picture}");
+    assert!(!picture.contains("NaN"), "{picture}");
+    assert!(picture.contains("One step that did not end"), "{picture}");
     schema::assert_valid(&serde_json::from_slice(&events).expect("a document"));
+}
+
+#[test]
+fn a_recording_of_no_clocks_has_a_picture_of_numbers() {
+    let mut taken = Taken::new(BoardConfig::default());
+    let span = Span { begin: taken.recording.span.begin, end: taken.recording.span.begin };
+    let recording = &mut taken.recording;
+    recording.span = span;
+    (recording.accesses, recording.doorbells) = (vec![], vec![]);
+    (recording.stages, recording.waits) = (vec![], vec![]);
+    recording.interrupt = Levels { first: false, edges: vec![] };
+    for channel in &mut recording.channels {
+        (channel.packets, channel.descriptors) = (vec![], vec![]);
+        channel.port.clear();
+    }
+    let mut picture = Vec::new();
+    taken.traced().write_timeline(&mut picture).expect("a vector takes all");
+    let picture = String::from_utf8(picture).expect("text");
+    assert!(!picture.contains("NaN") && !picture.contains("inf"), "{picture}");
 }
 
 #[test]

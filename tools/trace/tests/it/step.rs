@@ -42,6 +42,11 @@ impl Taken {
 
     /// The second step of a board, with a fault if one is given.
     pub(crate) fn with(config: BoardConfig, fault: Option<Fault>) -> Self {
+        Self::repeated(config, fault, 0)
+    }
+
+    /// The same; the driver repeats the step up to `retries` times.
+    pub(crate) fn repeated(config: BoardConfig, fault: Option<Fault>, retries: u32) -> Self {
         let board = EmulatedBoard::new(config).expect("a board that can be built");
         let choice = BoardChoice::Emulated(board.cpu_port());
         let options = OpenOptions { board: choice, ..OpenOptions::default() };
@@ -71,6 +76,7 @@ impl Taken {
         }
         let before = board.counts();
         board.record();
+        let parameters = parameters.with_retries(retries);
         let report = accelerator.step(&mut bodies, &collisions, &parameters).ok();
         let (after, packets) = (board.counts(), board.packets());
         let accesses = board.register_accesses();
