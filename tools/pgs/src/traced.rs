@@ -31,6 +31,19 @@ pub(crate) struct TracedArgs {
     timeline: Option<PathBuf>,
 }
 
+/// Why a step has no files.
+const NOTHING: &str = "no clock of the step has passed on the board";
+
+/// Whether the files show the inside of a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Inside {
+    /// They do.
+    Shown,
+    /// No file was written: the step was not reached, or ended before the board was asked for anything.
+    #[default]
+    Nothing,
+}
+
 /// A board to record a step of.
 #[derive(Debug)]
 pub(crate) struct Tracing<'a> {
@@ -72,13 +85,16 @@ impl TracedArgs {
     }
 
     /// The files, for people.
-    pub(crate) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.given().try_for_each(|(name, path)| writeln!(out, "{name:<10} {}", path.display()))
+    pub(crate) fn print(&self, inside: Inside, out: &mut dyn Write) -> io::Result<()> {
+        self.given().try_for_each(|(name, path)| match inside {
+            Inside::Shown => writeln!(out, "{name:<10} {}", path.display()),
+            Inside::Nothing => writeln!(out, "{name:<10} not written: {NOTHING}"),
+        })
     }
 
     /// The same for programs; null without any.
-    pub(crate) fn to_json(&self) -> Value {
-        match self.is_given() {
+    pub(crate) fn to_json(&self, inside: Inside) -> Value {
+        match self.is_given() && inside == Inside::Shown {
             true => json!({
                 "vcd": self.vcd.as_ref().map(|path| path.display().to_string()),
                 "trace": self.trace.as_ref().map(|path| path.display().to_string()),
@@ -95,12 +111,15 @@ impl Tracing<'_> {
         self.board.record();
     }
 
-    /// Ends the recording and writes the files; all of them, or none. A step that failed has no
-    /// report.
-    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<(), Failure> {
-        match self.board.take_recording() {
-            Some(recording) => self.write(&recording, report),
-            None => Ok(()),
+    /// Ends the recording and writes the files; all of them, or none. A step that failed or was interrupted
+    /// has no report.
+    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<Inside, Failure> {
+        match self.board.take_recording().filter(|recording| recording.span.clocks() > 0) {
+            Some(recording) => self.write(&recording, report).map(|()| Inside::Shown),
+            None => {
+                log::warn!("no file shows the step: {NOTHING}");
+                Ok(Inside::Nothing)
+            }
         }
     }
 
@@ -123,5 +142,22 @@ impl Tracing<'_> {
             Failure::new(Cause::Output, error)
                 .next("make room, or name another file; no file has changed")
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_was_not_reached_names_no_file() {
+        let args = TracedArgs { vcd: Some("step.vcd".into()), ..TracedArgs::default() };
+        assert_eq!(args.to_json(Inside::Nothing), Value::Null);
+        assert_eq!(args.to_json(Inside::Shown)["vcd"], "step.vcd");
+        assert_eq!(TracedArgs::default().to_json(Inside::Shown), Value::Null);
+        let mut out = Vec::new();
+        args.print(Inside::Nothing, &mut out).expect("a vector takes all");
+        let said = String::from_utf8(out).expect("text");
+        assert!(said.starts_with("vcd        not written: "), "{said}");
     }
 }

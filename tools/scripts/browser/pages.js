@@ -68,6 +68,18 @@ async function view(page, { measure, screenshot }) {
 	await page.keyboard.press("0");
 	assert.equal(before, await pixels(page), "the key 0 brings the first view back");
 
+	await page.evaluate(() => window.player.setTime(window.player.end));
+	const time = () => page.evaluate(() => window.player.time);
+	const times = await page.evaluate(() => Array.from(window.player.recording.times));
+	for (const [key, back] of [[",", 2], [",", 3], [".", 2], [".", 1]]) {
+		await page.keyboard.press(key);
+		assert.equal(await time(), times[times.length - back], `the key ${key} goes to the frame beside`);
+	}
+	await page.evaluate(() => window.player.setTime((window.player.recording.times[1] + window.player.recording.times[2]) / 2));
+	await page.keyboard.press(",");
+	assert.equal(await time(), times[1], "between two frames the key , goes to the one before");
+	await at(page, 0.6);
+
 	await page.keyboard.press("t");
 	assert.notEqual(before, await pixels(page), "the key T changes between light and dark");
 	await page.keyboard.press("t");

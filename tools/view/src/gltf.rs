@@ -1,9 +1,9 @@
 //! Writes a recording as glTF 2.0: a node for each body, with an animation of its translation and
 //! rotation.
 //!
-//! Node 0 is the ground, node k the k-th moving body: body k of a scene whose ground is body 0. All bodies of one kind share a mesh, and all channels share the accessor of the
-//! times. The buffer has the times, the surfaces, and for each body its translations and its
-//! rotations in the order of time.
+//! Node 0 is the ground. Node k is the k-th moving body, which is body k where the ground is body 0.
+//! All bodies of one kind share a mesh, and all channels share the accessor of the times. The buffer has
+//! the times, the surfaces, and for each body its translations and its rotations in the order of time.
 //!
 //! Source: Khronos Group, glTF 2.0 Specification, sections 3.6 (buffers), 3.11 (animations), 4.4 (GLB).
 
@@ -12,6 +12,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::base64;
+use crate::error::ViewError;
+use crate::kinds::{COLOURS, surfaces};
 use crate::mesh::Mesh;
 use crate::recording::{Recording, TooLarge};
 
@@ -24,16 +26,20 @@ const GLB_MAGIC: u32 = 0x4654_6C67;
 const GLB_JSON: u32 = 0x4E4F_534A;
 const GLB_BINARY: u32 = 0x004E_4942;
 
-/// Colours of the ground and, in turn, of the kinds.
+/// Colour of the ground, linear.
 const GROUND_COLOUR: [f32; 4] = [0.45, 0.47, 0.5, 1.0];
-const COLOURS: [[f32; 4]; 6] = [
-    [0.24, 0.47, 0.72, 1.0],
-    [0.85, 0.45, 0.2, 1.0],
-    [0.3, 0.6, 0.4, 1.0],
-    [0.75, 0.65, 0.25, 1.0],
-    [0.55, 0.4, 0.65, 1.0],
-    [0.6, 0.3, 0.3, 1.0],
-];
+
+/// A colour of sRGB, up to 255, as the linear one that materials have (section 3.9.2).
+fn linear(colour: [f32; 3]) -> [f32; 4] {
+    let [red, green, blue] = colour.map(|value| {
+        let share = value / 255.0;
+        match share <= 0.040_45 {
+            true => share / 12.92,
+            false => libm::powf((share + 0.055) / 1.055, 2.4),
+        }
+    });
+    [red, green, blue, 1.0]
+}
 
 /// A part of the buffer.
 #[derive(Debug, Serialize)]
@@ -99,20 +105,20 @@ struct Document {
 /// The recording as one file of JSON, its buffer inside as base64.
 ///
 /// # Errors
-/// [`TooLarge`]: the buffer has 4 GiB or more.
-pub fn text(recording: &Recording) -> Result<String, TooLarge> {
+/// [`ViewError`]: the buffer has 4 GiB or more, or a geometry has no surface.
+pub fn text(recording: &Recording) -> Result<String, ViewError> {
     let (document, buffer) = document(recording)?;
     let uri = format!("data:application/octet-stream;base64,{}", base64::encode(&buffer));
-    Ok(document.json(buffer.len(), Some(uri)))
+    document.json(buffer.len(), Some(uri))
 }
 
 /// The recording as a binary file (GLB).
 ///
 /// # Errors
-/// [`TooLarge`]: the file has 4 GiB or more.
-pub fn binary(recording: &Recording) -> Result<Vec<u8>, TooLarge> {
+/// [`ViewError`]: the file has 4 GiB or more, or a geometry has no surface.
+pub fn binary(recording: &Recording) -> Result<Vec<u8>, ViewError> {
     let (document, mut buffer) = document(recording)?;
-    let mut text = document.json(buffer.len(), None).into_bytes();
+    let mut text = document.json(buffer.len(), None)?.into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     buffer.resize(buffer.len().next_multiple_of(4), 0);
     // A header of three words; in front of each chunk two.
@@ -139,14 +145,14 @@ struct Parts {
     channels: Vec<Channel>,
 }
 
-fn document(recording: &Recording) -> Result<(Parts, Vec<u8>), TooLarge> {
+fn document(recording: &Recording) -> Result<(Parts, Vec<u8>), ViewError> {
     let frames = recording.frames();
     let (count, bodies) = (frames.len(), recording.bodies());
     TooLarge::check("the buffer", 28 * count as u64 * bodies as u64)?;
     let mut document = Document::default();
     document.mesh(&ground(), GROUND_MATERIAL);
-    for (kind, geometry) in recording.geometries().iter().enumerate() {
-        document.mesh(&Mesh::of(geometry), 1 + kind % COLOURS.len());
+    for (kind, mesh) in surfaces(recording.geometries())?.iter().enumerate() {
+        document.mesh(mesh, 1 + kind % COLOURS.len());
     }
     let mut nodes = vec![Node { mesh: 0, translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] }];
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
@@ -312,7 +318,7 @@ impl Document {
 
 impl Parts {
     /// The text of the document; `uri` is where the buffer is, unless it follows in the same file.
-    fn json(&self, buffer_bytes: usize, uri: Option<String>) -> String {
+    fn json(&self, buffer_bytes: usize, uri: Option<String>) -> Result<String, ViewError> {
         #[derive(Serialize)]
         #[serde(rename_all = "camelCase")]
         struct Root<'a> {
@@ -339,7 +345,7 @@ impl Parts {
         if let Some(uri) = uri {
             buffer["uri"] = uri.into();
         }
-        let colours = [GROUND_COLOUR].into_iter().chain(COLOURS);
+        let colours = [GROUND_COLOUR].into_iter().chain(COLOURS.map(linear));
         let material = |colour: [f32; 4]| {
             json!({ "pbrMetallicRoughness": {
                 "baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.8,
@@ -358,8 +364,7 @@ impl Parts {
             buffer_views: views,
             buffers: json!([buffer]),
         };
-        // Only maps with keys that are no text, and values that fail by themselves, have no JSON.
-        serde_json::to_string(&root).unwrap_or_default()
+        serde_json::to_string(&root).map_err(ViewError::Json)
     }
 }
 

@@ -9,7 +9,9 @@
 #![forbid(unsafe_code)]
 
 mod base64;
+mod error;
 pub mod gltf;
+mod kinds;
 mod mesh;
 pub mod npz;
 pub mod page;
@@ -17,4 +19,5 @@ pub mod picture;
 mod quantise;
 mod recording;
 
-pub use recording::{Frame, Recording, TooLarge};
+pub use error::ViewError;
+pub use recording::{Frame, NotFinite, Recording, TooLarge};

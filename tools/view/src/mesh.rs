@@ -25,11 +25,11 @@ struct Ring {
 }
 
 impl Mesh {
-    /// The surface of a geometry.
-    pub(crate) fn of(geometry: &Geometry) -> Self {
-        match *geometry {
+    /// The surface of a geometry; none for a hull of too few points.
+    pub(crate) fn of(geometry: &Geometry) -> Option<Self> {
+        let mesh = match *geometry {
             Geometry::Box { half_extents } => Self::of_faces(&box_faces(half_extents)),
-            Geometry::Hull { points } => Self::of_faces(&hull_faces(points).unwrap_or_default()),
+            Geometry::Hull { points } => Self::of_faces(&hull_faces(points)?),
             Geometry::Sphere { radius } => Self::of_rings(&capsule(0.0, radius)),
             Geometry::Capsule { half_height, radius } => {
                 Self::of_rings(&capsule(half_height, radius))
@@ -48,7 +48,8 @@ impl Mesh {
                 }
                 mesh
             }
-        }
+        };
+        (!mesh.faces.is_empty()).then_some(mesh)
     }
 
     /// Adds a corner; returns its index. The largest mesh has a few hundred corners, which 16 bits count.
@@ -198,11 +199,11 @@ mod tests {
             (Geometry::Cylinder { half_height, radius }, pi * 0.375, 0.03),
         ];
         for (geometry, expected, tolerance) in solids {
-            let found = volume(&Mesh::of(&geometry));
+            let found = volume(&Mesh::of(&geometry).expect("a surface"));
             assert!((found / expected - 1.0).abs() < tolerance, "{geometry:?}: {found}");
         }
         let hull = fixture(1).geometries().iter().copied().find(|g| g.name() == "hull");
-        let mesh = Mesh::of(&hull.expect("a hull"));
+        let mesh = Mesh::of(&hull.expect("a hull")).expect("a surface");
         // A cuboctahedron has 5/6 of the box around it.
         assert!((volume(&mesh) / (8.0 * 0.9 * 0.5 * 0.6) - 5.0 / 6.0).abs() < 1e-5);
         assert_eq!((mesh.faces.len(), mesh.triangles().count()), (8 + 6, 8 + 2 * 6));
@@ -211,7 +212,7 @@ mod tests {
     #[test]
     fn normals_are_unit_and_point_outwards() {
         for geometry in fixture(1).geometries() {
-            let mesh = Mesh::of(geometry);
+            let mesh = Mesh::of(geometry).expect("a surface");
             assert_eq!(mesh.positions.len(), mesh.normals.len());
             for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
                 assert!((dot(*normal, *normal) - 1.0).abs() < 1e-5, "{geometry:?}: {normal:?}");

@@ -2,7 +2,7 @@
 //!
 //! A position is a whole number of quanta from the lowest corner of all positions. A quaternion
 //! is its three smallest components and the index of the largest. A speed is the distance
-//! from the last frame over the time between: 0 below [`REST`], otherwise the root of its share of
+//! from the last frame over the time between: 0 below [`SLOWEST`], otherwise the root of its share of
 //! the largest speed. The page's `decode.js` undoes each step.
 //!
 //! In the order of the bytes: for each frame, for each of the six numbers of a body, the difference
@@ -18,14 +18,15 @@ use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use zynq_pgs::Pose;
 
+use crate::error::ViewError;
 use crate::recording::{Frame, Recording};
 
 /// Largest whole number of a position.
 const POSITION_MOST: f64 = 65_535.0;
 /// Largest whole number of a component of a quaternion.
 const COMPONENT_MOST: f64 = 4095.0;
-/// A body that moves less than this is at rest, m/s.
-pub(crate) const REST: f32 = 0.05;
+/// The slowest speed that is told from none, m/s.
+const SLOWEST: f64 = 0.05;
 /// Largest whole number of a speed.
 const SPEED_MOST: f64 = 255.0;
 
@@ -41,7 +42,7 @@ pub(crate) struct Quantised {
     /// Largest number of a component.
     pub(crate) component_most: f64,
     /// Largest speed, m/s.
-    pub(crate) speed_most: f32,
+    pub(crate) speed_most: f64,
     pub(crate) error: Error,
 }
 
@@ -76,7 +77,7 @@ impl Scale {
             }
         }
         let extent = |axis: usize| f64::from(high[axis]) - f64::from(low[axis]);
-        let largest = [0, 1, 2].map(extent).into_iter().fold(0.0, f64::max);
+        let largest = [0, 1, 2].map(extent).into_iter().fold(0.0, larger);
         // Without bodies, or with one that never moves, any quantum does.
         let quantum = if largest > 0.0 { largest / POSITION_MOST } else { 1.0 };
         Self { low: low.map(|value| if value.is_finite() { value } else { 0.0 }), quantum }
@@ -134,18 +135,25 @@ impl Scale {
             let difference = q[k] - sign * exact[k] / length;
             chord += difference * difference;
         }
-        let angle = 4.0 * libm::asin((0.5 * chord.sqrt()).min(1.0));
+        let half = 0.5 * chord.sqrt();
+        let angle = 4.0 * libm::asin(if half < 1.0 { half } else { 1.0 });
         Error { distance: distance.sqrt(), angle: angle.to_degrees() }
     }
 }
 
+/// The larger of two numbers.
+fn larger(one: f64, other: f64) -> f64 {
+    if other > one { other } else { one }
+}
+
 /// The nearest whole number from 0 to `most`.
 fn whole(value: f64, most: f64) -> u16 {
-    let value = value.clamp(0.0, most);
+    let value = if value > 0.0 { value } else { 0.0 };
+    let value = if value < most { value } else { most };
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "the value is between 0 and 65,535, and a NaN becomes 0"
+        reason = "the value is between 0 and 65,535"
     )]
     let whole = (value + 0.5) as u16;
     whole
@@ -159,48 +167,51 @@ fn zigzag(now: u16, before: u16) -> [u8; 2] {
 }
 
 /// Distance from one pose to the next over the time between, m/s.
-fn speeds<'a>(before: &'a Frame, now: &'a Frame) -> impl Iterator<Item = f32> + 'a {
-    let time = now.time - before.time;
+fn speeds<'a>(before: &'a Frame, now: &'a Frame) -> impl Iterator<Item = f64> + 'a {
+    let time = f64::from(now.time) - f64::from(before.time);
     before.poses.iter().zip(&now.poses).map(move |(before, now)| {
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| now.position[axis] - before.position[axis]);
+        let [x, y, z] = [0, 1, 2]
+            .map(|axis: usize| f64::from(now.position[axis]) - f64::from(before.position[axis]));
         let distance = ((x * x + y * y) + z * z).sqrt();
         if time > 0.0 { distance / time } else { 0.0 }
     })
 }
 
+/// The kind of each body as a byte.
+fn kinds(recording: &Recording) -> Result<Vec<u8>, ViewError> {
+    let (found, most) = (recording.geometries().len(), usize::from(u8::MAX) + 1);
+    let bytes = recording.kinds().iter().map(|kind| u8::try_from(*kind));
+    bytes.collect::<Result<_, _>>().map_err(|_| ViewError::TooManyKinds { found, most })
+}
+
 /// Quantises and compresses the poses.
-pub(crate) fn quantise(recording: &Recording) -> Quantised {
+pub(crate) fn quantise(recording: &Recording) -> Result<Quantised, ViewError> {
     let frames = recording.frames();
     let scale = Scale::of(frames);
-    let speed_most = frames
-        .windows(2)
-        .flat_map(|pair| speeds(&pair[0], &pair[1]))
-        .fold(REST, |most, speed| if speed > most { speed } else { most });
+    let speed_most =
+        frames.windows(2).flat_map(|pair| speeds(&pair[0], &pair[1])).fold(SLOWEST, larger);
     let bodies = recording.bodies();
     let mut error = Error::default();
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::new(6));
-    let mut put = |bytes: &[u8]| {
-        // A vector takes every write.
-        let _ = encoder.write_all(bytes);
-    };
-    put(&recording.kinds().iter().map(|k| u8::try_from(*k).unwrap_or(u8::MAX)).collect::<Vec<_>>());
+    let mut put = |bytes: &[u8]| encoder.write_all(bytes).map_err(ViewError::Compression);
+    put(&kinds(recording)?)?;
     let mut before: Vec<Numbers> = vec![([0; 6], 0); bodies];
     let mut speed_before = vec![0_u8; bodies];
     for (index, frame) in frames.iter().enumerate() {
         let now: Vec<Numbers> = frame.poses.iter().map(|pose| scale.numbers(pose)).collect();
         for (pose, numbers) in frame.poses.iter().zip(&now) {
             let found = scale.error(pose, *numbers);
-            error.distance = error.distance.max(found.distance);
-            error.angle = error.angle.max(found.angle);
+            error.distance = larger(error.distance, found.distance);
+            error.angle = larger(error.angle, found.angle);
         }
         for k in 0..6 {
             let differences =
                 || now.iter().zip(&before).map(|(now, was)| zigzag(now.0[k], was.0[k]));
-            put(&differences().map(|[low, _]| low).collect::<Vec<_>>());
-            put(&differences().map(|[_, high]| high).collect::<Vec<_>>());
+            put(&differences().map(|[low, _]| low).collect::<Vec<_>>())?;
+            put(&differences().map(|[_, high]| high).collect::<Vec<_>>())?;
         }
         let pairs = now.iter().zip(&before);
-        put(&pairs.map(|(now, was)| now.1.wrapping_sub(was.1)).collect::<Vec<_>>());
+        put(&pairs.map(|(now, was)| now.1.wrapping_sub(was.1)).collect::<Vec<_>>())?;
         let speed: Vec<u8> = match index.checked_sub(1) {
             None => vec![0; bodies],
             Some(last) => {
@@ -208,24 +219,24 @@ pub(crate) fn quantise(recording: &Recording) -> Quantised {
             }
         };
         let pairs = speed.iter().zip(&speed_before);
-        put(&pairs.map(|(now, was)| now.wrapping_sub(*was)).collect::<Vec<_>>());
+        put(&pairs.map(|(now, was)| now.wrapping_sub(*was)).collect::<Vec<_>>())?;
         (before, speed_before) = (now, speed);
     }
-    Quantised {
-        bytes: encoder.finish().unwrap_or_default(),
+    Ok(Quantised {
+        bytes: encoder.finish().map_err(ViewError::Compression)?,
         low: scale.low,
         quantum: scale.quantum,
         component_most: COMPONENT_MOST,
         speed_most,
         error,
-    }
+    })
 }
 
-fn speed_number(speed: f32, most: f32) -> u8 {
-    if speed < REST {
+fn speed_number(speed: f64, most: f64) -> u8 {
+    if speed < SLOWEST {
         return 0;
     }
-    let share = (f64::from(speed) / f64::from(most)).sqrt();
+    let share = (speed / most).sqrt();
     u8::try_from(whole(share * SPEED_MOST, SPEED_MOST)).unwrap_or(u8::MAX).max(1)
 }
 
@@ -233,6 +244,7 @@ fn speed_number(speed: f32, most: f32) -> u8 {
 mod tests {
     use super::*;
     use crate::recording::fixture;
+    use scene::Geometry;
     use std::io::Read as _;
 
     /// Undoes the compression and the differences, as the page does.
@@ -267,14 +279,14 @@ mod tests {
     #[test]
     fn decoded_poses_are_as_near_as_the_error_says() {
         let recording = fixture(6);
-        let found = quantise(&recording);
+        let found = quantise(&recording).expect("six kinds");
         let scale = Scale { low: found.low, quantum: found.quantum };
         let mut largest = Error::default();
         for (frame, decoded) in recording.frames().iter().zip(decode(&found, 6, 18)) {
             for (pose, (numbers, _)) in frame.poses.iter().zip(decoded) {
                 let error = scale.error(pose, numbers);
-                largest.distance = largest.distance.max(error.distance);
-                largest.angle = largest.angle.max(error.angle);
+                largest.distance = larger(largest.distance, error.distance);
+                largest.angle = larger(largest.angle, error.angle);
             }
         }
         assert_eq!(largest, found.error);
@@ -302,7 +314,7 @@ mod tests {
     #[test]
     fn speeds_tell_rest_from_motion() {
         let recording = fixture(6);
-        let found = quantise(&recording);
+        let found = quantise(&recording).expect("six kinds");
         let decoded = decode(&found, 6, 18);
         // The first three bodies stay where they are; the others fall ever faster.
         for (body, (_, speed)) in decoded[5].iter().enumerate() {
@@ -310,6 +322,36 @@ mod tests {
         }
         assert!(decoded[5].iter().any(|(_, speed)| *speed == 255));
         assert!(decoded[0].iter().all(|(_, speed)| *speed == 0));
+    }
+
+    #[test]
+    fn a_speed_beyond_f32_is_a_number() {
+        let pose = |y| Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+        let frame = |step, time, y| Frame { step, time, poses: vec![pose(y)] };
+        let (before, now) = (frame(0, 0.0, -f32::MAX), frame(1, 0.001, f32::MAX));
+        let speed = speeds(&before, &now).next().expect("a body");
+        assert!(speed.is_finite() && speed > 6e41, "{speed}");
+        assert_eq!(speed_number(speed, speed), u8::MAX);
+    }
+
+    #[test]
+    fn more_kinds_than_a_byte_has_are_refused() {
+        use zynq_pgs::{Body, Velocity};
+        let recording = |kinds: u16| {
+            let radii = (0..kinds).map(|kind| f32::from(kind) + 1.0);
+            let geometries: Vec<_> =
+                radii.map(|radius| Some(Geometry::Sphere { radius })).collect();
+            let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+            let body = |shape| Body { pose, velocity: Velocity::default(), shape };
+            let bodies: Vec<Body> = (0..u32::from(kinds)).map(body).collect();
+            let mut recording = Recording::new(&bodies, &geometries);
+            recording.add(0, 0.0, &bodies).expect("finite poses");
+            recording
+        };
+        quantise(&recording(256)).expect("as many as a byte has");
+        let said = quantise(&recording(257)).expect_err("too many").to_string();
+        assert!(said.contains("at most 256 kinds of bodies on a page, found 257"), "{said}");
+        crate::gltf::binary(&recording(257)).expect("glTF has indices of its own");
     }
 
     #[test]

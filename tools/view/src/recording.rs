@@ -4,6 +4,8 @@ use scene::Geometry;
 use thiserror::Error;
 use zynq_pgs::{Body, Pose};
 
+use crate::kinds::Kinds;
+
 /// A file's format cannot hold a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
@@ -24,6 +26,34 @@ impl TooLarge {
         let most = u64::from(u32::MAX);
         u32::try_from(found).map_err(|_| Self { what, found, most })
     }
+}
+
+/// A frame that no file shows.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum NotFinite {
+    /// Its time.
+    #[error("expected a finite time of step {step}: give a shorter time step, or take fewer steps")]
+    Time {
+        /// The step.
+        step: u32,
+    },
+    /// The pose of a body.
+    #[error(
+        "expected a finite pose of body {body} after step {step}, with a direction: record the steps \
+         before it"
+    )]
+    Pose {
+        /// The step.
+        step: u32,
+        /// The body.
+        body: usize,
+    },
+}
+
+/// Whether a body can be shown there.
+fn is_finite(pose: &Pose) -> bool {
+    let turned = pose.orientation.iter().any(|value| value.abs() > 0.0);
+    turned && pose.position.iter().chain(&pose.orientation).all(|value| value.is_finite())
 }
 
 /// The poses after one step.
@@ -56,37 +86,33 @@ impl Recording {
     /// Begins a recording of the bodies that have a geometry; `geometries` has one for each shape.
     #[must_use]
     pub fn new(bodies: &[Body], geometries: &[Option<Geometry>]) -> Self {
-        let mut recording =
-            Self { bodies: vec![], geometries: vec![], kinds: vec![], frames: vec![] };
-        for (index, body) in bodies.iter().enumerate() {
-            let shape = usize::try_from(body.shape).ok();
-            let Some(Some(geometry)) = shape.and_then(|shape| geometries.get(shape)) else {
-                continue;
-            };
-            let known = recording.geometries.iter().position(|known| known == geometry);
-            let kind = known.unwrap_or_else(|| {
-                recording.geometries.push(*geometry);
-                recording.geometries.len() - 1
-            });
-            recording.bodies.push(index);
-            recording.kinds.push(kind);
-        }
-        recording
+        let Kinds { geometries, of_body } = Kinds::of(bodies, geometries);
+        let moving = of_body.iter().enumerate().filter_map(|(index, kind)| Some((index, (*kind)?)));
+        let (bodies, kinds) = moving.unzip();
+        Self { bodies, geometries, kinds, frames: vec![] }
     }
 
-    /// Adds a frame after `step` steps; does nothing if the last frame is that one. A body that `bodies`
-    /// lacks stays where it was.
-    pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) {
-        if self.frames.last().is_some_and(|frame| frame.step == step) {
-            return;
+    /// Adds a frame after `step` steps, or between that step and the next; does nothing if the last frame
+    /// has its time. A body that `bodies` lacks stays where it was.
+    ///
+    /// # Errors
+    /// [`NotFinite`]: a pose, or the time, is not a finite one. The recording is as it was.
+    pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) -> Result<(), NotFinite> {
+        if self.frames.last().is_some_and(|frame| frame.time.to_bits() == time.to_bits()) {
+            return Ok(());
+        }
+        if !time.is_finite() {
+            return Err(NotFinite::Time { step });
         }
         let last = self.frames.last().map(|frame| frame.poses.as_slice()).unwrap_or_default();
         let was = |place: usize| last.get(place).copied().unwrap_or(ORIGIN);
-        let poses = self.bodies.iter().enumerate();
-        let poses =
-            poses.map(|(place, index)| bodies.get(*index).map_or_else(|| was(place), |b| b.pose));
-        let poses = poses.collect();
+        let pose = |(place, index): (usize, &usize)| {
+            let pose = bodies.get(*index).map_or_else(|| was(place), |body| body.pose);
+            is_finite(&pose).then_some(pose).ok_or(NotFinite::Pose { step, body: *index })
+        };
+        let poses = self.bodies.iter().enumerate().map(pose).collect::<Result<_, _>>()?;
         self.frames.push(Frame { step, time, poses });
+        Ok(())
     }
 
     /// The number of moving bodies.
@@ -123,7 +149,7 @@ pub(crate) fn fixture(frames: u32) -> Recording {
     let mut recording = Recording::new(scene.bodies(), scene.geometries());
     for step in 0..frames {
         let time = 0.1 * f32::from(u16::try_from(step).expect("few"));
-        recording.add(step, time, scene.bodies());
+        recording.add(step, time, scene.bodies()).expect("finite poses");
         for (index, body) in scene.bodies_mut()[1..].iter_mut().enumerate() {
             if index > 2 {
                 let Pose { position, orientation } = &mut body.pose;
@@ -156,14 +182,36 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_recorded_once() {
+    fn a_time_is_recorded_once() {
         let mut recording = fixture(3);
         assert_eq!(recording.frames().len(), 3);
-        recording.add(2, 0.2, &[]);
+        recording.add(2, 0.2, &[]).expect("no frame");
         assert_eq!(recording.frames().len(), 3);
         // Bodies that are missing stay where they were.
-        recording.add(3, 0.3, &[]);
+        recording.add(3, 0.3, &[]).expect("finite poses");
         assert_eq!(recording.frames()[3].poses, recording.frames()[2].poses);
+    }
+
+    #[test]
+    fn a_pose_that_is_not_finite_is_refused_and_named() {
+        let scene = scene::Scene::new(&scene::SceneOptions::default()).expect("a scene");
+        let mut recording = Recording::new(scene.bodies(), scene.geometries());
+        let mut bodies = scene.bodies().to_vec();
+        recording.add(0, 0.0, &bodies).expect("finite poses");
+        for wrong in [
+            |pose: &mut Pose| pose.position[1] = f32::NAN,
+            |pose: &mut Pose| pose.position[2] = f32::INFINITY,
+            |pose: &mut Pose| pose.orientation[3] = f32::NEG_INFINITY,
+            |pose: &mut Pose| pose.orientation = [0.0; 4],
+        ] {
+            let whole = bodies[2].pose;
+            wrong(&mut bodies[2].pose);
+            let refused = recording.add(1, 0.1, &bodies);
+            assert_eq!(refused, Err(NotFinite::Pose { step: 1, body: 2 }));
+            bodies[2].pose = whole;
+        }
+        assert_eq!(recording.add(1, f32::NAN, &bodies), Err(NotFinite::Time { step: 1 }));
+        assert_eq!(recording.frames().len(), 1);
     }
 
     #[test]

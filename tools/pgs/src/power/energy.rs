@@ -1,5 +1,6 @@
 //! The energy of a step from the samples of the idle and the busy board.
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 use bitstream_model::estimate::thesis::recorded::ZCU102_WATTS;
@@ -23,9 +24,11 @@ impl Mean {
         }
         let both = |domain| {
             let count = samples.len() as f64;
-            let mean = samples.iter().map(|watts| watts.of(domain)).sum::<f64>() / count;
-            let squares =
-                samples.iter().map(|watts| (watts.of(domain) - mean).powi(2)).sum::<f64>();
+            let sum = |of: &dyn Fn(f64) -> f64| {
+                samples.iter().fold(0.0, |sum, watts| sum + of(watts.of(domain)))
+            };
+            let mean = sum(&|watts| watts) / count;
+            let squares = sum(&|watts| (watts - mean) * (watts - mean));
             (mean, (squares / (count - 1.0) / count).sqrt())
         };
         let ((logic, logic_error), (processor, processor_error)) =
@@ -62,10 +65,16 @@ impl Energy {
         idle: Mean,
         busy: Mean,
         elapsed: Duration,
-        steps: u32,
+        steps: NonZeroU32,
     ) -> Self {
         let rails = Domain::ALL.map(|domain| sensors.rails(domain));
-        Self { rails, idle, busy, seconds: elapsed.as_secs_f64() / f64::from(steps) }
+        Self { rails, idle, busy, seconds: elapsed.as_secs_f64() / f64::from(steps.get()) }
+    }
+
+    /// The domains that have a sensor, with their rails.
+    fn domains(&self) -> impl Iterator<Item = (Domain, &[&'static str])> {
+        let all = Domain::ALL.into_iter().zip(&self.rails);
+        all.filter(|(_, rails)| !rails.is_empty()).map(|(domain, rails)| (domain, &rails[..]))
     }
 
     /// Energy of a step above idle, J.
@@ -79,18 +88,18 @@ impl Energy {
 
     /// For people.
     pub(crate) fn text(&self) -> String {
-        let parts = Domain::ALL.iter().zip(&self.rails).filter(|(_, rails)| !rails.is_empty());
-        let parts: Vec<String> = parts
+        let parts: Vec<String> = self
+            .domains()
             .map(|(domain, rails)| {
-                let joules = self.joules(*domain);
+                let joules = self.joules(domain);
                 format!(
                     "{:.4} ± {:.4} J a step above idle in the {} ({}; idle {:.3} W, busy {:.3} W)",
                     joules.value,
                     joules.within,
                     domain.name(),
                     rails.join(", "),
-                    self.idle.watts.of(*domain),
-                    self.busy.watts.of(*domain),
+                    self.idle.watts.of(domain),
+                    self.busy.watts.of(domain),
                 )
             })
             .collect();
@@ -111,7 +120,7 @@ impl Energy {
             "samples_idle": self.idle.samples,
             "samples_busy": self.busy.samples,
         });
-        for (domain, rails) in Domain::ALL.into_iter().zip(&self.rails) {
+        for (domain, rails) in self.domains() {
             let joules = self.joules(domain);
             document[domain.key()] = json!({
                 "rails": rails,
@@ -147,13 +156,27 @@ mod tests {
         let samples = |logic: [f64; 2]| logic.map(|logic| Watts { logic, processor: 1.0 });
         let idle = Mean::of(&samples([1.9, 2.1])).expect("samples");
         let busy = Mean::of(&samples([5.0, 5.0])).expect("samples");
-        let energy = Energy::new(&sensors, idle, busy, Duration::from_secs(2), 100);
+        let steps = NonZeroU32::new(100).expect("steps");
+        let energy = Energy::new(&sensors, idle, busy, Duration::from_secs(2), steps);
         let joules = energy.joules(Domain::Logic);
         assert!((joules.value - 3.0 * 0.02).abs() < 1e-12);
         // The standard error of 1.9 and 2.1 is 0.1 W; the gain error is 0.006 W.
         assert!((joules.within - 0.2_f64.hypot(0.006) * 0.02).abs() < 1e-12);
         assert!(energy.joules(Domain::Processor).value.abs() < 1e-12);
         assert!(Mean::of(&samples([1.0, 1.0])[..1]).is_none());
+    }
+
+    #[test]
+    fn a_domain_without_sensors_has_no_power() {
+        let folder = monitors(&[("name", "ina226_u79", "1")]);
+        let sensors = Sensors::find(folder.path()).expect("sensors");
+        let mean = Mean::of(&[Watts { logic: 1.0, processor: 0.0 }; 3]).expect("samples");
+        let steps = NonZeroU32::new(1).expect("a step");
+        let energy = Energy::new(&sensors, mean, mean, Duration::from_secs(1), steps);
+        let document = energy.to_json();
+        assert_eq!(document["logic"]["rails"], json!(["VCCINT"]));
+        assert_eq!(document.get("processor"), None);
+        assert!(!energy.text().contains("processing system"));
     }
 
     #[test]

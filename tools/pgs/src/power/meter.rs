@@ -1,5 +1,8 @@
 //! Samples the sensors in a thread of its own.
 
+use std::num::NonZeroU32;
+use std::ops::RangeInclusive;
+use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -9,8 +12,16 @@ use std::time::{Duration, Instant};
 use super::energy::{Energy, Mean};
 use super::sensors::{SensorError, Sensors, Watts};
 
-/// Samples of the idle board before the first step.
-const IDLE_SAMPLES: u32 = 30;
+/// Samples of the idle board before the first step: as many as this time has, within limits.
+const IDLE_TIME: Duration = Duration::from_secs(3);
+const IDLE_SAMPLES: RangeInclusive<u128> = 5..=30;
+
+/// Samples of an idle board whose sensors have a new value once an interval.
+fn idle_samples(interval: Duration) -> u32 {
+    let samples = IDLE_TIME.as_millis() / interval.as_millis().max(1);
+    let samples = samples.clamp(*IDLE_SAMPLES.start(), *IDLE_SAMPLES.end());
+    u32::try_from(samples).unwrap_or(u32::MAX)
+}
 
 /// Samples the sensors until [`stop`](Self::stop).
 #[derive(Debug)]
@@ -33,30 +44,29 @@ impl PowerMeter {
     pub(crate) fn start(sensors: Sensors) -> Result<Self, SensorError> {
         let (_running, idle) = channel();
         let taken = Arc::new(AtomicUsize::new(0));
-        let idle = sample(&sensors, &idle, IDLE_SAMPLES, &AtomicUsize::new(0))?;
+        let idle = sample(&sensors, &idle, idle_samples(sensors.interval()), &AtomicUsize::new(0))?;
         let (stop, stopped) = channel();
         let (own, count) = (sensors.clone(), Arc::clone(&taken));
         let thread = std::thread::spawn(move || sample(&own, &stopped, u32::MAX, &count));
         Ok(Self { sensors, idle, started: Instant::now(), stop, thread, taken })
     }
 
-    /// Ends the sampling; the energy of each of `steps` steps. `None` for no step, or if the steps took
-    /// less time than a sensor needs for a value.
+    /// Ends the sampling; the energy of each of `steps` steps. `None` if the steps took less time than a
+    /// sensor needs for a value.
     ///
     /// # Errors
     /// [`SensorError`] if a sensor could not be read during the steps.
-    pub(crate) fn stop(self, steps: u32) -> Result<Option<Energy>, SensorError> {
+    pub(crate) fn stop(self, steps: NonZeroU32) -> Result<Option<Energy>, SensorError> {
         let Self { sensors, idle, started, stop, thread, taken } = self;
         log::debug!("{} samples of the power", taken.load(Ordering::Relaxed));
         let elapsed = started.elapsed();
         drop(stop);
-        let Ok(samples) = thread.join() else { return Ok(None) };
-        let samples = samples?;
+        let samples = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
         // The first value may be of the time before the steps.
         let Some((_, samples)) = samples.split_first() else { return Ok(None) };
         let means = (Mean::of(&idle), Mean::of(samples));
         let (Some(idle), Some(busy)) = means else { return Ok(None) };
-        Ok((steps > 0).then(|| Energy::new(&sensors, idle, busy, elapsed, steps)))
+        Ok(Some(Energy::new(&sensors, idle, busy, elapsed, steps)))
     }
 }
 
@@ -88,6 +98,17 @@ mod tests {
     use super::*;
     use std::fs;
 
+    fn steps(number: u32) -> NonZeroU32 {
+        NonZeroU32::new(number).expect("a step")
+    }
+
+    #[test]
+    fn slow_sensors_have_fewer_samples_of_the_idle_board() {
+        for (milliseconds, samples) in [(10, 30), (100, 30), (300, 10), (2000, 5)] {
+            assert_eq!(idle_samples(Duration::from_millis(milliseconds)), samples);
+        }
+    }
+
     #[test]
     fn the_idle_boards_power_is_subtracted() {
         let folder = monitors(&[("name", "ina226_u79", "2000000")]);
@@ -102,7 +123,7 @@ mod tests {
         while meter.taken.load(Ordering::Relaxed) < 4 {
             std::thread::yield_now();
         }
-        let energy = meter.stop(10).expect("power").expect("samples");
+        let energy = meter.stop(steps(10)).expect("power").expect("samples");
         let text = energy.text();
         // 3 W above idle, three intervals of 10 ms or more, 10 steps.
         assert!(energy.joules(super::super::sensors::Domain::Logic).value >= 0.009, "{text}");
@@ -120,6 +141,6 @@ mod tests {
         while !meter.thread.is_finished() {
             std::thread::yield_now();
         }
-        assert!(meter.stop(1).is_err());
+        assert!(meter.stop(steps(1)).is_err());
     }
 }

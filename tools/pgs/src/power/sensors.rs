@@ -12,8 +12,9 @@ pub(crate) const HWMON: &str = "/sys/class/hwmon";
 const PREFIX: &str = "ina226";
 /// Shortest time between two samples, whatever a sensor says.
 const INTERVAL_MIN: Duration = Duration::from_millis(10);
-/// Longest time between two samples: a sensor's own time is not trusted beyond it.
-const INTERVAL_MAX: Duration = Duration::from_millis(100);
+/// Longest time between two samples. A slower sensor would repeat its values, and the repetitions make the
+/// standard error too small.
+const INTERVAL_MAX: Duration = Duration::from_secs(2);
 /// Time between two samples of sensors that do not say it.
 const INTERVAL: Duration = Duration::from_millis(35);
 /// Largest gain error of the power: 0.1 % of the shunt voltage and 0.1 % of the bus voltage (data sheet
@@ -132,7 +133,7 @@ pub(crate) struct Sensors {
 
 impl Sensors {
     /// Finds the sensors under a folder of hardware monitors; `None` without a sensor of the
-    /// programmable logic.
+    /// programmable logic, or with one too slow to sample.
     pub(crate) fn find(hwmon: &Path) -> Option<Self> {
         let mut sensors = Vec::new();
         let mut interval = None;
@@ -147,7 +148,15 @@ impl Sensors {
         }
         sensors.sort_by_key(|sensor| RAILS.iter().position(|(_, rail, _)| *rail == sensor.rail));
         let logic = sensors.iter().any(|sensor| sensor.domain == Domain::Logic);
-        let interval = interval.unwrap_or(INTERVAL).clamp(INTERVAL_MIN, INTERVAL_MAX);
+        let interval = interval.unwrap_or(INTERVAL).max(INTERVAL_MIN);
+        if logic && interval > INTERVAL_MAX {
+            log::warn!(
+                "the power is not measured: expected sensors with a new value every {INTERVAL_MAX:?} or \
+                 less, found {interval:?}; write a smaller update_interval under {}",
+                hwmon.display()
+            );
+            return None;
+        }
         logic.then_some(Self { sensors, interval })
     }
 
@@ -224,6 +233,17 @@ pub(super) mod tests {
         assert_eq!(sensors.interval(), Duration::from_millis(40));
         let watts = sensors.read().expect("power");
         assert!((watts.logic - 3.0).abs() < 1e-12 && (watts.processor - 1.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slow_sensors_keep_their_interval_and_very_slow_ones_are_not_used() {
+        let folder = monitors(&[("name", "ina226_u79", "1"), ("name", "ina226_u76", "1")]);
+        let file = folder.path().join("hwmon1/update_interval");
+        fs::write(&file, "750\n").expect("written");
+        let sensors = Sensors::find(folder.path()).expect("sensors");
+        assert_eq!(sensors.interval(), Duration::from_millis(750));
+        fs::write(&file, "16900\n").expect("written");
+        assert!(Sensors::find(folder.path()).is_none());
     }
 
     #[test]

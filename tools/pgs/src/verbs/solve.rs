@@ -205,7 +205,7 @@ pub(crate) fn run(
         Err(error) => return Err(args.faults.failure(&opened, &parameters, error)),
     };
     // A step that failed is told before a file that cannot be written.
-    traced.transpose()?;
+    let inside = traced.transpose()?.unwrap_or_default();
     if let Some(path) = &args.out {
         folder::write_results(path, &bodies).map_err(|error| {
             Failure::input(error).next(format!(
@@ -234,7 +234,7 @@ pub(crate) fn run(
         document["folder"] = args.folder.display().to_string().into();
         document["board"] = opened.to_json();
         document["faults"] = opened.faults_json();
-        document["traced"] = args.traced.to_json();
+        document["traced"] = args.traced.to_json(inside);
         document["equal"] = args.compare.then_some(equal).into();
         writeln!(out, "{document:#}")?;
     } else if args.digest {
@@ -245,7 +245,7 @@ pub(crate) fn run(
             writeln!(out, "{faults}")?;
         }
         solved.print(out)?;
-        args.traced.print(out)?;
+        args.traced.print(inside, out)?;
     }
     if args.digest && !equal {
         for difference in solved.differences.iter().filter(|d| d.differing > 0) {

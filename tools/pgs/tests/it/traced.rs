@@ -1,12 +1,13 @@
 //! The files that show the inside of a step: what they have, who gets them, and the picture of the README.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::process::Stdio;
 
 use serde_json::Value;
 
-use crate::common::{golden, pgs, run, text};
+use crate::common::{golden, pgs, run, signal, text};
 
 /// The arguments that the page of the command line gives for the picture.
 const PICTURE: &str = "run --grid 6x6x6 --steps 40 --contact-iterations 4 --friction-iterations 4 \
@@ -26,6 +27,8 @@ fn the_picture_of_the_readme_is_what_its_command_draws() {
     let words = PICTURE.split_whitespace();
     let ran = run(words.map(|word| if word == "docs/step.svg" { text(&drawn) } else { word }));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let named = format!("timeline   {}", text(&drawn));
+    assert!(ran.stdout.lines().any(|line| line == named), "{}", ran.stdout);
     let drawn = fs::read_to_string(drawn).expect("the picture");
     let kept = fs::read_to_string(repository().join("docs/step.svg")).expect("the picture");
     assert!(drawn == kept, "docs/step.svg is another picture; draw it anew: {command}");
@@ -105,6 +108,54 @@ fn a_step_that_fails_is_shown_up_to_its_end() {
         all.iter().any(|event| event["name"].as_str().is_some_and(|name| name.contains("DMASR")))
     );
     assert!(all.iter().all(|event| event["cat"] != "host"));
+}
+
+#[test]
+fn a_step_that_is_refused_before_its_first_clock_has_no_files() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let step = folder.path().join("step");
+    fs::create_dir(&step).expect("a folder");
+    for file in fs::read_dir(golden("two_cubes")).expect("the folder") {
+        let file = file.expect("a file");
+        fs::copy(file.path(), step.join(file.file_name())).expect("copied");
+    }
+    let turns = step.join("body_quat.npy");
+    let mut bytes = fs::read(&turns).expect("the array");
+    let values = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    // Body 1 has no orientation.
+    bytes[values + 16..values + 32].fill(0);
+    fs::write(&turns, bytes).expect("the array");
+    let file = folder.path().join("step.svg");
+    let mut command = pgs();
+    command.env("RUST_LOG", "warn").args(["solve", text(&step), "--timeline", text(&file)]);
+    let ran = command.output().expect("it starts");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert_eq!((ran.status.code(), ran.stdout.as_slice()), (Some(2), &b""[..]), "{said}");
+    assert!(said.contains("no file shows the step: no clock"), "{said}");
+    assert!(!file.exists());
+}
+
+#[test]
+fn a_run_that_ends_before_the_step_names_no_files() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let file = folder.path().join("step.json");
+    let mut command = pgs();
+    command.args(["run", "--grid", "2x2x2", "--steps", "100000000", "--report-every", "1"]);
+    command.arg("--trace").arg(&file);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("it starts");
+    let mut child = crate::common::Tied(child);
+    let mut lines = BufReader::new(child.0.stdout.take().expect("a pipe"));
+    let mut line = String::new();
+    while line.split_whitespace().next() != Some("1") {
+        line.clear();
+        assert!(lines.read_line(&mut line).expect("text") > 0, "the run goes on");
+    }
+    signal("-TERM", child.0.id());
+    let mut rest = String::new();
+    lines.read_to_string(&mut rest).expect("text");
+    assert_eq!(child.0.wait().expect("it ends").code(), Some(130));
+    assert!(rest.contains("trace      not written: no clock"), "{rest}");
+    assert!(!file.exists());
 }
 
 #[test]

@@ -59,7 +59,7 @@ class Colouring {
 	}
 
 	legend(name) {
-		const { speedMost, high } = this.recording.head;
+		const { speedMost } = this.recording.head;
 		return {
 			speed: ["Speed (the scale is a root)", "0 m/s", `${speedMost.toFixed(1)} m/s`],
 			rest: ["Age of rest", "moves", `${this.recording.restMost().toFixed(1)} s and more`],

@@ -12,8 +12,10 @@ async function inflate(bytes) {
 	return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Numbers of a body and frame: position, three components of the quaternion.
+// Whole numbers of a pose: three of the position, three of the quaternion.
 const NUMBERS = 6;
+// Bytes of a body and frame: two of each number, the largest component of the quaternion, the speed.
+const BYTES = 2 * NUMBERS + 2;
 
 // The frames as whole numbers: `numbers[frame][k * bodies + body]`, `largest` and `speed` likewise.
 class Recording {
@@ -21,6 +23,8 @@ class Recording {
 		this.head = head;
 		this.bodies = head.bodies;
 		this.times = head.times;
+		const expected = this.bodies * (1 + BYTES * this.times.length);
+		if (raw.length !== expected) throw new Error(`it has ${raw.length} bytes of poses in place of ${expected}`);
 		this.kinds = raw.subarray(0, this.bodies);
 		this.numbers = [];
 		this.largest = [];

@@ -5,6 +5,10 @@
 // and six triangles. Each triangle takes the shade of its last corner, and both triangles of a face
 // have one last corner.
 
+// Bodies in a row of the texture: 2 to the power of this.
+const ROW_BITS = 9;
+const ROW = 1 << ROW_BITS;
+
 const VERTEX_BEGIN = `#version 300 es
 precision highp float;
 uniform highp sampler2D bodies;
@@ -13,7 +17,7 @@ uniform mat4 matrix;
 struct Body { vec3 position; vec4 rotation; vec3 colour; };
 Body bodyOf(int index) {
 	index += firstBody;
-	ivec2 at = ivec2(2 * (index & 511), index >> 9);
+	ivec2 at = ivec2(2 * (index & ${ROW - 1}), index >> ${ROW_BITS});
 	vec4 place = texelFetch(bodies, at, 0);
 	int colour = int(place.w);
 	vec3 parts = vec3(colour & 255, colour >> 8 & 255, colour >> 16) / 255.0;
@@ -32,11 +36,11 @@ uniform vec3 eye;
 uniform vec3 size;
 flat out vec3 colour;
 out vec3 local;
-const vec3 CORNERS[7] = vec3[7](vec3(1), vec3(1, 1, -1), vec3(1, -1, 1), vec3(-1, 1, 1),
+const vec3 CORNERS[${BOX_CORNERS}] = vec3[${BOX_CORNERS}](vec3(1), vec3(1, 1, -1), vec3(1, -1, 1), vec3(-1, 1, 1),
 	vec3(1, -1, -1), vec3(-1, 1, -1), vec3(-1, -1, 1));
 void main() {
-	int index = gl_VertexID / 7;
-	int corner = gl_VertexID - 7 * index;
+	int index = gl_VertexID / ${BOX_CORNERS};
+	int corner = gl_VertexID - ${BOX_CORNERS} * index;
 	Body body = bodyOf(index);
 	vec4 back = vec4(-body.rotation.xyz, body.rotation.w);
 	vec3 side = mix(vec3(1), vec3(-1), lessThan(turned(back, eye - body.position), vec3(0)));
@@ -105,10 +109,8 @@ void main() {
 	result = vec4(mix(colour, back, smoothstep(0.3, 1.0, length(share))), 1.0);
 }`;
 
-// Floats of a body in the texture: position and colour, quaternion. Bodies in a row of the texture, as in
-// the shader.
+// Floats of a body in the texture: position and colour, quaternion.
 const FLOATS = 8;
-const ROW = 512;
 // Steps of the depth by which bodies are sorted.
 const BINS = 1024;
 // Most corners in one call.
@@ -200,8 +202,9 @@ class Painter {
 		const n = kinds.length;
 		let [nearest, farthest] = [Infinity, -Infinity];
 		for (let body = 0, at = 0; body < n; body++, at += 7) {
-			const depth = -(back[0] * poses[at] + back[1] * poses[at + 1] + back[2] * poses[at + 2]);
-			depths[body] = depth;
+			depths[body] = -(back[0] * poses[at] + back[1] * poses[at + 1] + back[2] * poses[at + 2]);
+			// As the array has rounded it: no depth lies before the nearest one.
+			const depth = depths[body];
 			if (depth < nearest) nearest = depth;
 			if (depth > farthest) farthest = depth;
 		}

@@ -6,6 +6,8 @@ use scene::Geometry;
 use serde_json::{Value, json};
 
 use crate::base64;
+use crate::error::ViewError;
+use crate::kinds::surfaces;
 use crate::mesh::{Mesh, dot};
 use crate::quantise;
 use crate::recording::Recording;
@@ -35,25 +37,33 @@ pub struct Page {
 }
 
 /// Makes the page; `facts` are labels and texts about the run.
-#[must_use]
-pub fn page(recording: &Recording, title: &str, facts: &[(&str, String)]) -> Page {
-    let found = quantise::quantise(recording);
+///
+/// # Errors
+/// [`ViewError`]: the bodies have too many kinds, or a geometry has no surface.
+pub fn page(
+    recording: &Recording,
+    title: &str,
+    facts: &[(&str, String)],
+) -> Result<Page, ViewError> {
+    let found = quantise::quantise(recording)?;
+    let surfaces = surfaces(recording.geometries())?;
+    let kinds = recording.geometries().iter().zip(&surfaces);
     let error = found.error;
     let (low, high) = view(recording);
     let head = json!({
         "bodies": recording.bodies(),
         "times": recording.frames().iter().map(|frame| frame.time).collect::<Vec<_>>(),
-        "kinds": recording.geometries().iter().map(kind).collect::<Vec<_>>(),
+        "kinds": kinds.map(|(geometry, mesh)| kind(geometry, mesh)).collect::<Vec<_>>(),
         "low": found.low,
         "quantum": found.quantum,
         "componentMost": found.component_most,
         "speedMost": found.speed_most,
         "view": { "low": low, "high": high },
     });
-    let own = ("poses", format!("{} frames, {}", recording.frames().len(), error.text()));
-    let facts = facts.iter().map(|(label, text)| (*label, text.as_str()));
+    let poses = format!("{} frames, {}", recording.frames().len(), error.text());
     let facts: String = facts
-        .chain([(own.0, own.1.as_str())])
+        .iter()
+        .chain(&[("poses", poses)])
         .map(|(label, text)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(label), escaped(text)))
         .collect();
     let poses = base64::encode(&found.bytes);
@@ -70,7 +80,7 @@ pub fn page(recording: &Recording, title: &str, facts: &[(&str, String)]) -> Pag
             ("script", &script),
         ],
     );
-    Page { html, error }
+    Ok(Page { html, error })
 }
 
 impl Error {
@@ -101,8 +111,7 @@ fn view(recording: &Recording) -> ([f32; 3], [f32; 3]) {
 
 /// The surface that the page draws for a geometry: a box by its size, all others by triangles; and the radii of
 /// the balls inside and around it.
-fn kind(geometry: &Geometry) -> Value {
-    let mesh = Mesh::of(geometry);
+fn kind(geometry: &Geometry, mesh: &Mesh) -> Value {
     let places = mesh.positions.iter().zip(&mesh.normals);
     let inside = places.map(|(position, normal)| dot(*position, *normal));
     let inside =
@@ -150,7 +159,7 @@ mod tests {
 
     fn page_of_six() -> Page {
         let facts = [("board", "emulated <&>".to_owned())];
-        page(&fixture(6), "18 bodies </title>", &facts)
+        page(&fixture(6), "18 bodies </title>", &facts).expect("six kinds")
     }
 
     #[test]

@@ -6,6 +6,7 @@ const element = id => document.getElementById(id);
 const PICTURES_WANTED = 33;
 const COARSEST = 0.4;
 const END_SHOWN = 1; // Seconds that the last frame stays.
+const SAME_FRAME = 1e-6; // Seconds.
 
 class Player {
 	constructor(recording) {
@@ -67,12 +68,14 @@ class Player {
 		this.dirty = true;
 	}
 
-	// Goes to the frame before or behind the time.
-	stepFrames(count) {
+	// Goes to the next frame, or to the one before.
+	stepFrames(direction) {
 		const { times } = this.recording;
 		this.setPlaying(false);
-		const reached = times.findLastIndex(time => time <= this.time + 1e-6);
-		this.setTime(times[Math.min(Math.max(reached + count, 0), times.length - 1)]);
+		const frame = direction > 0
+			? times.findIndex(time => time > this.time + SAME_FRAME)
+			: times.findLastIndex(time => time < this.time - SAME_FRAME);
+		if (frame >= 0) this.setTime(times[frame]);
 	}
 
 	// One picture of the browser's rhythm.

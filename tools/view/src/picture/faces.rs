@@ -4,20 +4,13 @@ use scene::Geometry;
 use zynq_pgs::{Body, Pose};
 
 use super::camera::View;
+use crate::error::ViewError;
+use crate::kinds::{COLOURS, Kinds, surfaces};
 use crate::mesh::{Mesh, cross, dot, minus};
 
 /// Colours of low and high bodies, where all are of one kind.
 const LOW: [f32; 3] = [52.0, 92.0, 148.0];
 const HIGH: [f32; 3] = [238.0, 196.0, 96.0];
-/// Colours of the kinds in turn, where they differ.
-const KINDS: [[f32; 3]; 6] = [
-    [86.0, 140.0, 200.0],
-    [226.0, 140.0, 80.0],
-    [110.0, 176.0, 128.0],
-    [222.0, 190.0, 90.0],
-    [160.0, 126.0, 190.0],
-    [196.0, 100.0, 104.0],
-];
 /// Where the light comes from, of length 1.
 const LIGHT: [f32; 3] = [0.48, 0.8, 0.36];
 
@@ -32,40 +25,46 @@ pub(super) struct Face {
     pub(super) colours: Vec<[f32; 3]>,
 }
 
-/// Calls `draw` with each face; `geometries` has one for each shape.
-pub(super) fn for_each(
-    bodies: &[Body],
-    geometries: &[Option<Geometry>],
-    view: &View,
-    mut draw: impl FnMut(Face),
-) {
-    let meshes: Vec<Option<Mesh>> =
-        geometries.iter().map(|geometry| geometry.as_ref().map(Mesh::of)).collect();
-    let mut kinds: Vec<&Geometry> = Vec::new();
-    for geometry in geometries.iter().flatten() {
-        if !kinds.contains(&geometry) {
-            kinds.push(geometry);
-        }
-    }
-    let heights = bodies.iter().filter(|body| mesh_of(body, &meshes).is_some());
-    let highest = heights.map(|body| body.pose.position[1]).fold(1.0, f32::max);
-    for (index, body) in (0..).zip(bodies) {
-        let Some(mesh) = mesh_of(body, &meshes) else { continue };
-        let colour = if kinds.len() > 1 {
-            let shape = usize::try_from(body.shape).unwrap_or(0);
-            let kind = kinds.iter().position(|kind| geometries[shape].as_ref() == Some(*kind));
-            KINDS[kind.unwrap_or(0) % KINDS.len()]
-        } else {
-            let share = (body.pose.position[1] / highest).clamp(0.0, 1.0);
-            [0, 1, 2].map(|k: usize| (1.0 - share) * LOW[k] + share * HIGH[k])
-        };
-        for_each_of(index, body.pose, mesh, colour, view, &mut draw);
-    }
+/// Bodies with their surfaces.
+#[derive(Debug)]
+pub(super) struct Surfaces<'a> {
+    bodies: &'a [Body],
+    /// The kind of each body.
+    kinds: Vec<Option<usize>>,
+    /// The surface of each kind.
+    meshes: Vec<Mesh>,
 }
 
-fn mesh_of<'a>(body: &Body, meshes: &'a [Option<Mesh>]) -> Option<&'a Mesh> {
-    let shape = usize::try_from(body.shape).ok()?;
-    meshes.get(shape)?.as_ref()
+impl<'a> Surfaces<'a> {
+    /// The surfaces of bodies; `geometries` has one for each shape.
+    pub(super) fn of(
+        bodies: &'a [Body],
+        geometries: &[Option<Geometry>],
+    ) -> Result<Self, ViewError> {
+        let kinds = Kinds::of(bodies, geometries);
+        Ok(Self { bodies, kinds: kinds.of_body, meshes: surfaces(&kinds.geometries)? })
+    }
+
+    /// The bodies that are drawn, with their index and kind.
+    fn drawn(&self) -> impl Iterator<Item = (u32, &'a Body, usize)> + '_ {
+        let bodies = (0..).zip(self.bodies).zip(&self.kinds);
+        bodies.filter_map(|((index, body), kind)| Some((index, body, (*kind)?)))
+    }
+
+    /// Calls `draw` with each face.
+    pub(super) fn for_each(&self, view: &View, mut draw: impl FnMut(Face)) {
+        let heights = self.drawn().map(|(_, body, _)| body.pose.position[1]);
+        let highest = heights.fold(1.0, |most, height| if height > most { height } else { most });
+        for (index, body, kind) in self.drawn() {
+            let colour = if self.meshes.len() > 1 {
+                COLOURS[kind % COLOURS.len()]
+            } else {
+                let share = (body.pose.position[1] / highest).clamp(0.0, 1.0);
+                [0, 1, 2].map(|k: usize| (1.0 - share) * LOW[k] + share * HIGH[k])
+            };
+            for_each_of(index, body.pose, &self.meshes[kind], colour, view, &mut draw);
+        }
+    }
 }
 
 fn for_each_of(
@@ -121,7 +120,9 @@ mod tests {
         let body = Body { pose, velocity: Velocity::default(), shape: 1 };
         let mut faces = Vec::new();
         let view = View::new(camera, 100, 100);
-        for_each(&[body], &[None, Some(Geometry::CUBE)], &view, |face| faces.push(face));
+        let bodies = [body];
+        let surfaces = Surfaces::of(&bodies, &[None, Some(Geometry::CUBE)]).expect("a cube");
+        surfaces.for_each(&view, |face| faces.push(face));
         assert_eq!(faces.len(), 3);
         let light = |face: &Face| face.colours[0][1];
         let highest = |face: &Face| face.corners.iter().map(|c| c[1]).fold(f32::INFINITY, f32::min);

@@ -9,9 +9,9 @@
 //! let bodies = [Body { pose, velocity: Velocity::default(), shape: 0 }];
 //! let camera = Camera::around([pose].iter(), 1.8, 1.5);
 //! let picture = Picture { width: 300, height: 200, ..Picture::new(&bodies, &[Some(Geometry::CUBE)], camera) };
-//! assert!(picture.svg().starts_with("<svg"));
+//! assert!(picture.svg()?.starts_with("<svg"));
 //! assert!(picture.png()?.starts_with(b"\x89PNG"));
-//! # Ok::<(), zynq_pgs_view::picture::PictureError>(())
+//! # Ok::<(), zynq_pgs_view::ViewError>(())
 //! ```
 
 mod camera;
@@ -20,11 +20,12 @@ mod raster;
 mod svg;
 
 use scene::Geometry;
-use thiserror::Error;
 use zynq_pgs::Body;
 
 use self::camera::View;
+use self::faces::Surfaces;
 use self::raster::{Raster, byte};
+use crate::error::ViewError;
 
 pub use self::camera::Camera;
 
@@ -36,14 +37,9 @@ const GROUND: [f32; 3] = [206.0, 209.0, 213.0];
 /// Share of a colour that an outline leaves.
 const OUTLINE: f32 = 0.55;
 
-/// A picture that cannot be encoded.
-#[derive(Debug, Error)]
-#[error("a picture of {width} by {height} pixels cannot be encoded")]
-pub struct PictureError {
-    width: u16,
-    height: u16,
-    source: png::EncodingError,
-}
+/// Most pixels a side, and in all: the finer picture has four times as many, of 16 bytes each.
+const SIDE_MOST: u16 = 16_384;
+const PIXELS_MOST: u32 = 1 << 24;
 
 /// A picture to draw.
 #[derive(Debug, Clone, Copy)]
@@ -83,40 +79,50 @@ impl<'a> Picture<'a> {
             Some((&body.pose, geometry))
         });
         let radius = drawn.clone().map(|(_, geometry)| geometry.bounding_radius());
-        let radius = radius.fold(0.0, f32::max);
+        let radius = radius.fold(0.0, |most, radius| if radius > most { radius } else { most });
         let [width, height] = Self::SIZE.map(f32::from);
         let camera = Camera::around(drawn.map(|(pose, _)| pose), radius, width / height);
         Self::new(bodies, geometries, camera)
     }
 
+    /// Refuses a picture without pixels, or with too many.
+    fn check(&self) -> Result<(), ViewError> {
+        let Self { width, height, .. } = *self;
+        let sides = [width, height].iter().all(|length| (1..=SIDE_MOST).contains(length));
+        if sides && u32::from(width) * u32::from(height) <= PIXELS_MOST {
+            return Ok(());
+        }
+        Err(ViewError::Size { width, height, side: SIDE_MOST, pixels: PIXELS_MOST })
+    }
+
     /// The picture as PNG.
     ///
     /// # Errors
-    /// [`PictureError`]: the picture has no pixels, or more than the format holds.
-    pub fn png(&self) -> Result<Vec<u8>, PictureError> {
-        let Self { width, height, .. } = *self;
+    /// [`ViewError`]: the picture has no pixels or too many, or a geometry has no surface.
+    pub fn png(&self) -> Result<Vec<u8>, ViewError> {
+        let pixels = self.pixels()?;
         let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, width.into(), height.into());
+        let mut encoder = png::Encoder::new(&mut bytes, self.width.into(), self.height.into());
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         let written = encoder.write_header().and_then(|mut writer| {
-            writer.write_image_data(&self.pixels())?;
+            writer.write_image_data(&pixels)?;
             writer.finish()
         });
-        match written {
-            Ok(()) => Ok(bytes),
-            Err(source) => Err(PictureError { width, height, source }),
-        }
+        written.map_err(ViewError::Png)?;
+        Ok(bytes)
     }
 
     /// Red, green and blue of each pixel.
-    fn pixels(&self) -> Vec<u8> {
-        let fine = |length: u16| length.saturating_mul(FINE);
-        let view = View::new(self.camera, fine(self.width), fine(self.height));
-        let mut raster = Raster::new(fine(self.width), fine(self.height));
+    fn pixels(&self) -> Result<Vec<u8>, ViewError> {
+        self.check()?;
+        let surfaces = Surfaces::of(self.bodies, self.geometries)?;
+        let [width, height] = [self.width, self.height].map(|length| length * FINE);
+        let view = View::new(self.camera, width, height);
+        let mut raster = Raster::new(width, height);
         let mut number = 0;
-        faces::for_each(self.bodies, self.geometries, &view, |face| {
+        surfaces.for_each(&view, |face| {
             number += 1;
             raster.fill(number, &face);
         });
@@ -134,7 +140,7 @@ impl<'a> Picture<'a> {
                 pixels.extend(sums.map(|sum| byte(sum / count) & 0xFC | 2));
             }
         }
-        pixels
+        Ok(pixels)
     }
 }
 
@@ -185,7 +191,7 @@ mod tests {
         assert_eq!((reader.info().width, reader.info().height), (150, 90));
         let mut pixels = vec![0; 3 * 150 * 90];
         reader.next_frame(&mut pixels).expect("pixels");
-        assert_eq!(pixels, picture.pixels());
+        assert_eq!(pixels, picture.pixels().expect("drawn"));
         // Six kinds of bodies in their colours, lit from several sides.
         let colours: std::collections::BTreeSet<&[u8]> = pixels.chunks(3).collect();
         assert!(colours.len() > 100, "{}", colours.len());
@@ -193,10 +199,14 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_without_pixels_is_refused() {
+    fn a_picture_without_pixels_or_with_too_many_is_refused() {
         let scene = scene();
         let whole = Picture::of_all(scene.bodies(), scene.geometries());
-        let said = Picture { width: 0, ..whole }.png().expect_err("no pixels").to_string();
-        assert_eq!(said, "a picture of 0 by 720 pixels cannot be encoded");
+        for (width, height) in [(0, 720), (1200, 0), (SIDE_MOST + 1, 1), (5000, 5000)] {
+            let picture = Picture { width, height, ..whole };
+            let said = [picture.png().expect_err("png").to_string()];
+            assert_eq!(said, [picture.svg().expect_err("svg").to_string()]);
+            assert!(said[0].ends_with(&format!("found {width} by {height}")), "{said:?}");
+        }
     }
 }

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use super::Picture;
 use super::camera::View;
-use super::faces::{self, Face};
+use super::faces::{Face, Surfaces};
 use super::raster::{Raster, byte};
+use crate::error::ViewError;
 
 /// Pixels of a face that make it seen.
 const SEEN: u32 = 3;
@@ -17,15 +18,19 @@ impl Picture<'_> {
     ///
     /// Hidden faces are left out. The others are painted from far to near, which is exact for bodies
     /// that do not intersect much.
-    #[must_use]
-    pub fn svg(&self) -> String {
+    ///
+    /// # Errors
+    /// [`ViewError`]: the picture has no pixels or too many, or a geometry has no surface.
+    pub fn svg(&self) -> Result<String, ViewError> {
+        self.check()?;
+        let surfaces = Surfaces::of(self.bodies, self.geometries)?;
         let [width, height] = [self.width, self.height].map(|length| length.saturating_mul(UNITS));
         let view = View::new(self.camera, width, height);
         let mut raster = Raster::new(width, height);
         let mut seen: Vec<Face> = Vec::new();
         let mut number = 0;
         // The first time all faces are drawn, the second time the seen ones are kept.
-        faces::for_each(self.bodies, self.geometries, &view, |face| {
+        surfaces.for_each(&view, |face| {
             number += 1;
             raster.fill(number, &face);
         });
@@ -34,7 +39,7 @@ impl Picture<'_> {
             counts[pixel.face as usize] += 1;
         }
         let mut counts = counts.into_iter().skip(1);
-        faces::for_each(self.bodies, self.geometries, &view, |face| {
+        surfaces.for_each(&view, |face| {
             if counts.next().is_some_and(|count| count >= SEEN) {
                 seen.push(face);
             }
@@ -50,7 +55,7 @@ impl Picture<'_> {
             path(&mut text, face);
         }
         text.push_str("</svg>\n");
-        text
+        Ok(text)
     }
 }
 
@@ -110,7 +115,7 @@ mod tests {
         let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
         let scene = Scene::new(&options).expect("a scene");
         let picture = Picture::of_all(scene.bodies(), scene.geometries());
-        let text = picture.svg();
+        let text = picture.svg().expect("drawn");
         let faces = text.matches("<path").count() - 1;
         // Three sides of 25 faces, and faces that show through the gaps.
         assert!((75..250).contains(&faces), "{faces}");
@@ -118,6 +123,6 @@ mod tests {
             text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 2400 1440\"")
         );
         assert!(text.ends_with("z\"/>\n</svg>\n"));
-        assert_eq!(text, picture.svg());
+        assert_eq!(text, picture.svg().expect("drawn"));
     }
 }

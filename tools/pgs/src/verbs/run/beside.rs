@@ -34,6 +34,12 @@ pub(super) struct Beside {
     kinetic_energy: f64,
 }
 
+/// Whether the scene is stepped: as the user chooses, or by default unless the energy of a step is to be
+/// measured, to which the steps of two scenes would add up.
+pub(super) fn is_stepped(choice: Option<bool>, by_default: bool, has_sensors: bool) -> bool {
+    choice.unwrap_or(by_default && !has_sensors)
+}
+
 impl Cold {
     /// A scene that is stepped with the parameters of the run, but for a warm start and frictions.
     pub(super) fn new(
@@ -65,21 +71,28 @@ impl Cold {
         Ok(beside)
     }
 
-    fn end(&mut self) -> Option<FinalState> {
-        let Self { scene, last, .. } = self;
-        last.as_ref().map(|last| FinalState::of(scene, last))
+    /// Whether its last step is that one.
+    pub(super) fn has_taken(&self, step: u32) -> bool {
+        self.last.as_ref().is_some_and(|last| last.step == step)
     }
 
-    /// The pile at the end, for people.
-    pub(super) fn end_text(&mut self) -> Option<String> {
+    /// The pile after `done` steps; none if it has taken fewer.
+    fn end(&mut self, done: u32) -> Option<FinalState> {
+        let Self { scene, last, .. } = self;
+        let last = last.as_ref().filter(|last| last.step == done)?;
+        Some(FinalState::of(scene, last))
+    }
+
+    /// The pile at the end of `done` steps, for people.
+    pub(super) fn end_text(&mut self, done: u32) -> Option<String> {
         let text =
             |end: FinalState| format!("the same without warm start, one friction, {}", end.text());
-        self.end().map(text)
+        self.end(done).map(text)
     }
 
-    /// The pile at the end, for programs.
-    pub(super) fn end_json(&mut self) -> Option<Value> {
-        self.end().map(FinalState::to_json)
+    /// The pile at the end of `done` steps, for programs.
+    pub(super) fn end_json(&mut self, done: u32) -> Option<Value> {
+        self.end(done).map(FinalState::to_json)
     }
 }
 
@@ -93,5 +106,33 @@ impl Beside {
             "deepest_penetration_m": self.deepest,
             "kinetic_energy_before_gravity_j": self.kinetic_energy,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene::SceneOptions;
+    use zynq_pgs::OpenOptions;
+
+    #[test]
+    fn a_board_with_sensors_steps_one_scene_unless_asked() {
+        assert!(is_stepped(None, true, false));
+        assert!(!is_stepped(None, true, true));
+        assert!(is_stepped(Some(true), false, true));
+        assert!(!is_stepped(Some(false), true, false));
+    }
+
+    #[test]
+    fn a_scene_that_has_taken_fewer_steps_has_no_end() {
+        let grid = "1x1x1".parse().expect("a grid");
+        let scene = Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).expect("a scene");
+        let mut accelerator = Accelerator::open(OpenOptions::default()).expect("an emulated board");
+        accelerator.set_shapes(scene.shapes()).expect("two shapes");
+        let mut cold = Cold::new(scene, &StepParameters::default(), None);
+        assert!(!cold.has_taken(1) && cold.end_text(1).is_none());
+        cold.step(1, &mut accelerator).expect("no fault").expect("no Ctrl-C");
+        assert!(cold.has_taken(1) && cold.end_text(1).is_some());
+        assert!(!cold.has_taken(2) && cold.end_json(2).is_none());
     }
 }

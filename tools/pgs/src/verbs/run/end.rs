@@ -6,7 +6,6 @@ use scene::Scene;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
-use super::beside::Cold;
 use super::summary::{BoardFacts, Summary};
 use super::{Course, RunArgs, is_emulated};
 use crate::board::OpenBoard;
@@ -46,10 +45,12 @@ pub(super) fn print_end(
     out: &mut dyn Write,
 ) -> io::Result<()> {
     writeln!(out)?;
-    let cold = course.cold.as_mut().and_then(Cold::end_text);
+    let done = course.done;
+    let cold = course.cold.as_mut().and_then(|cold| cold.end_text(done));
     let Course { done, retries, orders, footprint, .. } = &*course;
-    if *done != args.steps() {
-        writeln!(out, "interrupted after {done} of {} steps", args.steps())?;
+    if !course.is_complete(args.steps()) {
+        let cold = if *done == args.steps() { ", and before the last cold one" } else { "" };
+        writeln!(out, "interrupted after {done} of {} steps{cold}", args.steps())?;
     }
     if let Some(faults) = opened.faults_text() {
         writeln!(out, "{faults}")?;
@@ -82,7 +83,6 @@ pub(super) fn document(
     opened: &OpenBoard,
     scene: &mut Scene,
     mut course: Course,
-    complete: bool,
 ) -> Value {
     let mut config = args.scene.to_json();
     config["steps"] = args.steps().into();
@@ -96,7 +96,8 @@ pub(super) fn document(
     config["shape_friction"] = parameters.shape_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
-    let cold = course.cold.as_mut().and_then(Cold::end_json);
+    let (done, complete) = (course.done, course.is_complete(args.steps()));
+    let cold = course.cold.as_mut().and_then(|cold| cold.end_json(done));
     let summary = summary(args, parameters, opened, scene, &course);
     let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
     json!({
@@ -110,7 +111,7 @@ pub(super) fn document(
         "beside_cold": cold,
         "energy": course.energy.as_ref().map(|(_, energy)| energy),
         "faults": opened.faults_json(),
-        "traced": args.traced.to_json(),
+        "traced": args.traced.to_json(course.inside),
         "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },
     })

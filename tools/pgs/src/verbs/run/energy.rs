@@ -1,15 +1,29 @@
 //! The energy of a step, measured on a real board with sensors.
 
+use std::num::NonZeroU32;
 use std::path::Path;
 
 use serde_json::Value;
 
 use crate::power::{HWMON, PowerMeter, Sensors, at_thesis_power};
 
-/// Samples the idle board, then begins to sample the steps; `None` without sensors.
-pub(super) fn start(is_emulated: bool) -> Option<PowerMeter> {
-    let sensors = if is_emulated { None } else { Sensors::find(Path::new(HWMON)) };
-    match PowerMeter::start(sensors?) {
+/// The sensors of a real board, if it has any.
+pub(super) fn sensors(is_emulated: bool) -> Option<Sensors> {
+    if is_emulated { None } else { Sensors::find(Path::new(HWMON)) }
+}
+
+/// Samples the idle board, then begins to sample the steps. Sensors beside a second scene measure nothing:
+/// they would see the steps of both.
+pub(super) fn start(sensors: Option<Sensors>, is_alone: bool) -> Option<PowerMeter> {
+    let sensors = sensors?;
+    if !is_alone {
+        log::warn!(
+            "the energy is not measured: the sensors also see the steps of the cold scene; leave out \
+             --beside-cold"
+        );
+        return None;
+    }
+    match PowerMeter::start(sensors) {
         Ok(meter) => Some(meter),
         Err(error) => {
             log::warn!("the energy is not measured: {error}");
@@ -19,13 +33,25 @@ pub(super) fn start(is_emulated: bool) -> Option<PowerMeter> {
 }
 
 /// The energy of a step for people and for programs: measured, or at the thesis' power for a step that
-/// takes `ms` milliseconds.
-pub(super) fn end(meter: Option<PowerMeter>, steps: u32, ms: f64) -> (String, Value) {
+/// takes `ms` milliseconds. None without a step.
+pub(super) fn end(meter: Option<PowerMeter>, steps: u32, ms: f64) -> Option<(String, Value)> {
+    let steps = NonZeroU32::new(steps)?;
     match meter.map(|meter| meter.stop(steps)) {
-        Some(Ok(Some(energy))) => return (energy.text(), energy.to_json()),
+        Some(Ok(Some(energy))) => return Some((energy.text(), energy.to_json())),
         Some(Ok(None)) => log::warn!("the energy is not measured: the steps ended too early"),
         Some(Err(error)) => log::warn!("the energy is not measured: {error}"),
         None => {}
     }
-    at_thesis_power(ms)
+    Some(at_thesis_power(ms))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_step_has_no_energy() {
+        assert!(end(None, 0, 0.0).is_none());
+        assert!(end(None, 1, 2.0).is_some());
+    }
 }

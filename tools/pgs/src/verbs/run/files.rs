@@ -10,8 +10,9 @@ use step_folder::replace::replace;
 use thiserror::Error;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
-use zynq_pgs_view::{Recording, TooLarge, gltf, npz};
+use zynq_pgs_view::{ViewError, gltf, npz};
 
+use super::film::{Film, Rhythm};
 use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
 use crate::output::files::check_folder;
@@ -39,6 +40,9 @@ pub(crate) struct FileArgs {
     /// Record about N frames beside the start, evenly spread.
     #[arg(long, value_name = "N", conflicts_with = "every", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    /// Record N frames a simulated second, with poses between two steps where a frame lies between them
+    #[arg(long, value_name = "N", conflicts_with_all = ["every", "frames"], value_parser = clap::value_parser!(u16).range(1..=1000))]
+    frames_per_second: Option<u16>,
 }
 
 /// A file for poses, and its format.
@@ -84,7 +88,19 @@ fn with_extension(text: &str, known: &[&str]) -> Result<PathBuf, String> {
 #[error("{} cannot hold the poses", path.display())]
 struct Unfit {
     path: PathBuf,
-    source: TooLarge,
+    source: ViewError,
+}
+
+impl Unfit {
+    fn failure(path: &Path, source: ViewError) -> Failure {
+        let is_size = matches!(source, ViewError::TooLarge(_));
+        let failure = Failure::input(Self { path: path.to_owned(), source });
+        if is_size {
+            failure.next("give --every, --frames or --frames-per-second with fewer frames")
+        } else {
+            failure
+        }
+    }
 }
 
 impl FileArgs {
@@ -99,18 +115,21 @@ impl FileArgs {
     }
 
     /// Begins to record a scene at its start; `None` if no file shows its course.
-    pub(super) fn film(&self, scene: &Scene, steps: u32, time_step: f32) -> Option<Film> {
+    pub(super) fn film(
+        &self,
+        scene: &Scene,
+        steps: u32,
+        time_step: f32,
+    ) -> Result<Option<Film>, Failure> {
         if self.poses.is_none() && self.view.is_none() {
-            return None;
+            return Ok(None);
         }
-        let every = match (self.every, self.frames) {
-            (Some(every), _) => every,
-            (None, frames) => steps.div_ceil(frames.unwrap_or(FRAMES)),
+        let rhythm = match (self.frames_per_second, self.every) {
+            (Some(frames), _) => Rhythm::in_time(frames, time_step, scene),
+            (None, Some(every)) => Rhythm::Steps(every),
+            (None, None) => Rhythm::Steps(steps.div_ceil(self.frames.unwrap_or(FRAMES)).max(1)),
         };
-        let recording = Recording::new(scene.bodies(), scene.geometries());
-        let mut film = Film { recording, every: every.max(1), time_step };
-        film.add(0, scene);
-        Some(film)
+        Film::new(scene, rhythm, time_step).map(Some)
     }
 
     /// Writes the picture of a scene.
@@ -119,9 +138,10 @@ impl FileArgs {
         let picture = Picture::of_all(scene.bodies(), scene.geometries());
         let Picture { width, height, .. } = picture;
         let bytes = match extension(path) {
-            "svg" => picture.svg().into_bytes(),
-            _ => picture.png().map_err(|error| Failure::new(Cause::Output, error))?,
+            "svg" => picture.svg().map(String::into_bytes),
+            _ => picture.png(),
         };
+        let bytes = bytes.map_err(|error| Failure::new(Cause::Output, error))?;
         let document = json!({ "width": width, "height": height });
         Written::new("picture", path, &bytes, format!("{width} x {height} pixels"), document)
             .map(Some)
@@ -134,24 +154,23 @@ impl FileArgs {
         title: &str,
         facts: &[(&str, String)],
     ) -> Result<Vec<Written>, Failure> {
-        let recording = &film.recording;
+        let recording = film.recording();
         let frames = recording.frames().len();
         let bodies = grouped(recording.bodies() as u64);
         let mut written = Vec::new();
         if let Some(PosesFile { path, format }) = &self.poses {
             let bytes = match format {
-                PosesFormat::Npz => npz::bytes(recording),
+                PosesFormat::Npz => npz::bytes(recording).map_err(ViewError::from),
                 PosesFormat::Gltf => gltf::text(recording).map(String::into_bytes),
                 PosesFormat::Glb => gltf::binary(recording),
             };
-            let bytes = bytes.map_err(|source| Unfit { path: path.clone(), source });
-            let bytes =
-                bytes.map_err(|error| Failure::input(error).next("give --every or --frames"))?;
+            let bytes = bytes.map_err(|error| Unfit::failure(path, error))?;
             let text = format!("{frames} frames of {bodies} bodies");
             written.push(Written::new("poses", path, &bytes, text, json!({ "frames": frames }))?);
         }
         if let Some(path) = &self.view {
-            let page = page(recording, title, facts);
+            let page =
+                page(recording, title, facts).map_err(|error| Unfit::failure(path, error))?;
             let text = format!("{frames} frames of {bodies} bodies, {}", page.error.text());
             let document = json!({
                 "frames": frames,
@@ -161,39 +180,6 @@ impl FileArgs {
             written.push(Written::new("view", path, page.html.as_bytes(), text, document)?);
         }
         Ok(written)
-    }
-}
-
-/// The poses of a run so far.
-#[derive(Debug)]
-pub(super) struct Film {
-    recording: Recording,
-    every: u32,
-    time_step: f32,
-}
-
-impl Film {
-    /// Adds the scene after `step` steps, if its frame is a chosen one.
-    pub(super) fn step(&mut self, steps: u32, scene: &Scene) {
-        if steps.is_multiple_of(self.every) {
-            self.add(steps, scene);
-        }
-    }
-
-    /// Adds the scene after the last step.
-    pub(super) fn end(&mut self, steps: u32, scene: &Scene) {
-        self.add(steps, scene);
-    }
-
-    /// The length of a step, s.
-    pub(super) fn time_step(&self) -> f32 {
-        self.time_step
-    }
-
-    fn add(&mut self, steps: u32, scene: &Scene) {
-        #[allow(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-        let time = (f64::from(self.time_step) * f64::from(steps)) as f32;
-        self.recording.add(steps, time, scene.bodies());
     }
 }
 

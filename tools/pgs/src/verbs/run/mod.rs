@@ -4,6 +4,7 @@ mod beside;
 mod end;
 mod energy;
 mod files;
+mod film;
 mod row;
 mod summary;
 
@@ -17,7 +18,8 @@ use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepRepor
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
-use self::files::{FileArgs, Film, Written};
+use self::files::{FileArgs, Written};
+use self::film::Film;
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::Totals;
 use crate::board::{self, OpenBoard};
@@ -35,7 +37,7 @@ use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
-use crate::traced::{TracedArgs, Tracing};
+use crate::traced::{Inside, TracedArgs, Tracing};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -57,6 +59,7 @@ Examples:
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
   pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
+  pgs run --view pile.html --frames-per-second 25    frames between two steps, for a film
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -103,7 +106,7 @@ pub(crate) struct RunArgs {
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
     /// deep its bodies sink and how much they move [default: on for --scene shapes with a warm start,
-    /// unless a fault is planned or --wide is given]
+    /// unless a fault is planned, --wide is given or the energy of a step is measured]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     beside_cold: Option<bool>,
     #[command(flatten)]
@@ -173,10 +176,13 @@ impl RunArgs {
 
     /// The scene that is stepped beside this one, if one is. A planned fault names a step of the board
     /// by its number, and the steps of a second scene would shift the numbers.
-    fn beside(&self, parameters: &StepParameters) -> Result<Option<Cold>, Failure> {
+    fn beside(
+        &self,
+        parameters: &StepParameters,
+        has_sensors: bool,
+    ) -> Result<Option<Cold>, Failure> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
-        let shown = shown && !self.wide;
-        let wanted = self.beside_cold.unwrap_or(shown);
+        let wanted = beside::is_stepped(self.beside_cold, shown && !self.wide, has_sensors);
         let scene = || self.scene.build(&self.build.build());
         let arranger = self.ordering.arranger(None);
         wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
@@ -200,6 +206,16 @@ struct Course {
     energy: Option<(String, Value)>,
     /// The poses for the files.
     film: Option<Film>,
+    /// Whether the traced step was reached.
+    inside: Inside,
+}
+
+impl Course {
+    /// Whether all steps were taken, and those of the scene beside it.
+    fn is_complete(&self, steps: u32) -> bool {
+        let cold = self.cold.as_ref();
+        self.done == steps && cold.is_none_or(|cold| cold.has_taken(steps))
+    }
 }
 
 /// Steps the scene.
@@ -221,19 +237,21 @@ pub(crate) fn run(
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
-    let mut course = Course { cold: args.beside(&parameters)?, ..Course::default() };
+    let sensors = energy::sensors(is_emulated(&opened));
+    let cold = args.beside(&parameters, sensors.is_some())?;
+    let mut course = Course { cold, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
-    course.film = args.files.film(&scene, args.steps(), parameters.time_step);
+    course.film = args.files.film(&scene, args.steps(), parameters.time_step)?;
 
-    let meter = energy::start(is_emulated(&opened));
+    let meter = energy::start(sensors, course.cold.is_none());
     let scenes = (&mut scene, &mut course);
     let with = (&parameters, tracing.as_ref());
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
-    course.energy = Some(energy::end(meter, course.done, course.totals.mean()));
-    let complete = course.done == args.steps();
+    course.energy = energy::end(meter, course.done, course.totals.mean());
+    let complete = course.is_complete(args.steps());
     let written = write_files(args, &opened, &scene, &mut course)?;
     if common.json {
-        let mut document = document(args, &parameters, &opened, &mut scene, course, complete);
+        let mut document = document(args, &parameters, &opened, &mut scene, course);
         for file in written {
             document["files"][file.label] = file.document;
         }
@@ -243,6 +261,7 @@ pub(crate) fn run(
         for file in written {
             fact(out, file.label, &file.text)?;
         }
+        args.traced.print(course.inside, out)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
@@ -256,7 +275,7 @@ fn write_files(
 ) -> Result<Vec<Written>, Failure> {
     let mut written = Vec::new();
     if let Some(film) = &mut course.film {
-        film.end(course.done, scene);
+        film.end(course.done, scene)?;
         let digest = digest::of_bodies(scene.bodies());
         let facts = [
             ("scene", args.scene.text()),
@@ -298,7 +317,9 @@ fn take_steps(
         });
         // A step that failed is told before a file that cannot be written.
         let row = row.map_err(|error| args.faults.failure(opened, parameters, error))?;
-        traced.transpose()?;
+        if let Some(inside) = traced.transpose()? {
+            course.inside = inside;
+        }
         opened.alive()?;
         let Some(row) = row else { break };
         let mut beside = None;
@@ -310,7 +331,7 @@ fn take_steps(
         }
         course.done += 1;
         if let Some(film) = &mut course.film {
-            film.step(course.done, scene);
+            film.step(course.done, scene)?;
         }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);

@@ -19,7 +19,7 @@ use crate::output::{limit_text, milliseconds};
 
 /// Average speed up to which a pile is at rest (root mean square, weighted by mass, rotation
 /// included), m/s.
-const REST: f64 = 0.05;
+const PILE_AT_REST: f64 = 0.05;
 
 /// Sums over the steps of a run.
 #[derive(Debug, Default)]
@@ -166,7 +166,7 @@ impl FinalState {
     }
 
     fn is_at_rest(&self) -> bool {
-        self.speed <= REST
+        self.speed <= PILE_AT_REST
     }
 
     pub(super) fn text(&self) -> String {

@@ -31,7 +31,7 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
         .with_contact_iterations(ITERATIONS)
         .with_friction_iterations(ITERATIONS);
     let mut recording = Recording::new(scene.bodies(), scene.geometries());
-    recording.add(0, 0.0, scene.bodies());
+    recording.add(0, 0.0, scene.bodies()).map_err(Failure::input)?;
     let mut most = 0;
     for step in 1..=STEPS {
         effort.go_on()?;
@@ -40,7 +40,8 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
         let stepped = opened.accelerator.step(bodies, collisions, &parameters);
         stepped.map_err(|error| opened.failure(error))?;
         if step.is_multiple_of(EVERY) {
-            recording.add(step.into(), f32::from(step) * parameters.time_step, scene.bodies());
+            let time = f32::from(step) * parameters.time_step;
+            recording.add(step.into(), time, scene.bodies()).map_err(Failure::input)?;
         }
     }
     let cubes = grouped(recording.bodies() as u64);
@@ -51,10 +52,10 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
         id: "figure-4-1",
         thesis: "Figure 4.1",
         title: format!("A snapshot of the scene: {cubes} cubes after {STEPS} steps"),
-        svg: Picture::of_all(scene.bodies(), scene.geometries()).svg(),
+        svg: Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
         caption: "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.".to_owned(),
         origin: Origin::Measured,
-        playback: Some(page(&recording, &title, &facts).html),
+        playback: Some(page(&recording, &title, &facts).map_err(Failure::input)?.html),
     };
     let row = Row {
         thesis: "§4.3, Figure 4.1".to_owned(),

@@ -1,0 +1,61 @@
+//! What keeps a recording or a picture from becoming a file.
+
+use std::io;
+
+use scene::Geometry;
+use thiserror::Error;
+
+use crate::recording::TooLarge;
+
+/// A recording or a picture that cannot become a file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ViewError {
+    /// The file's format cannot hold it.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
+    /// More kinds of bodies than a byte can tell apart.
+    #[error(
+        "expected at most {most} kinds of bodies on a page, found {found}: record fewer bodies, or write them as glTF"
+    )]
+    TooManyKinds {
+        /// The kinds of the recording.
+        found: usize,
+        /// The most that a page holds.
+        most: usize,
+    },
+    /// A hull of too few points.
+    #[error(
+        "expected a geometry with a surface, found the {} of kind {kind} without one: give it four points \
+         or more that span a volume", geometry.name()
+    )]
+    NoSurface {
+        /// Its number among the kinds of bodies.
+        kind: usize,
+        /// The geometry.
+        geometry: Geometry,
+    },
+    /// The size of a picture.
+    #[error(
+        "expected a picture of 1 to {side} pixels a side and at most {pixels} in all, found {width} by {height}"
+    )]
+    Size {
+        /// Pixels across.
+        width: u16,
+        /// Pixels down.
+        height: u16,
+        /// The most a side.
+        side: u16,
+        /// The most in all.
+        pixels: u32,
+    },
+    /// The poses cannot be compressed.
+    #[error("the poses cannot be compressed")]
+    Compression(#[source] io::Error),
+    /// The document cannot be written as JSON.
+    #[error("the document cannot be written as JSON")]
+    Json(#[source] serde_json::Error),
+    /// The pixels cannot be encoded.
+    #[error("the picture cannot be encoded as PNG")]
+    Png(#[source] png::EncodingError),
+}
