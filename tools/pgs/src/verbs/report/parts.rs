@@ -70,7 +70,6 @@ fn of_all(
         Some(path) => Step::folder(path)?,
         None => Step::of_pile(args, common, &effort)?,
     };
-    // In the order of the thesis.
     about("time steps")?;
     let mut part = figures::time_step::part(&effort)?;
     part.append(figures::euler::part()?);
@@ -92,8 +91,9 @@ fn of_all(
     about("stages of a step")?;
     part.append(figures::stages::part(common)?);
     part.append(figures::ladder::part()?);
-    part.append(figures::designs::part()?);
     part.rows.extend(tables::of_chapter_6(&tables)?);
+    part.append(figures::designs::part()?);
+    part.sort();
     Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part, tables })
 }
 
