@@ -98,8 +98,10 @@ mod tests {
 
     #[test]
     fn a_pile_that_no_board_or_this_board_takes_is_refused_before_it_is_built() {
-        for (side, part) in [(200, "no board takes"), (60, "the board takes at most")] {
-            let grid = Grid::new(side, side, side).expect("a grid");
+        for ([x, y, z], part) in
+            [([180, 1000, 180], "no board takes"), ([60, 60, 60], "the board takes at most")]
+        {
+            let grid = Grid::new(x, y, z).expect("a grid");
             let refused = open(grid, 0.0, &common(), &Build::default()).expect_err("too large");
             assert!(refused.chain().contains(part), "{}", refused.chain());
         }

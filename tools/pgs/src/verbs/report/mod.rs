@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn a_grid_that_no_board_takes_is_refused_before_it_is_built() {
         let folder = tempfile::tempdir().expect("a folder");
-        for grid in ["1000x1000x1000", "60x60x60"] {
+        for grid in ["180x1000x180", "60x60x60"] {
             let failure = failure(folder.path(), &format!("--board emulated --grid {grid}"));
             assert!(failure.chain().contains("bodies with the ground"), "{}", failure.chain());
         }
