@@ -125,6 +125,9 @@ const CHAPTER_6: [Source; 5] = [
     },
 ];
 
+/// The first sources of chapter 6: results of the designs alone (Tables 6.4 and 6.8).
+const RESULTS: usize = 2;
+
 /// A place of a design's figures, from the short name of a table.
 fn of_design(design: &Design, table: &str, what: &str) -> String {
     let table = match table.strip_prefix('T') {
@@ -149,9 +152,11 @@ pub(super) fn of_chapter_4(tables: &[Table]) -> Result<Vec<Row>, Failure> {
 }
 
 pub(super) fn of_chapter_6(tables: &[Table]) -> Result<Vec<Row>, Failure> {
+    let (results, comparisons) = CHAPTER_6.split_at(RESULTS);
     let mut all = vec![device(), powers()];
-    all.extend(rows(&CHAPTER_6, tables)?);
+    all.extend(rows(results, tables)?);
     all.extend(DESIGNS.map(logic));
+    all.extend(rows(comparisons, tables)?);
     Ok(all)
 }
 

@@ -147,7 +147,7 @@ fn layouts(one: &Studied<Outcome>) -> Vec<Row> {
         command: one.command.clone(),
         shown: "figure-4-10".to_owned(),
     };
-    let mut rows = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for split in &one.outcome.splits {
         let (layout, range) = match split.format {
             "binary16" => ("§4.6.1, Figures 4.3 and 4.4", None),
@@ -157,12 +157,15 @@ fn layouts(one: &Studied<Outcome>) -> Vec<Row> {
             _ => continue,
         };
         let [exponent, mantissa] = SIXTEEN_BITS;
-        rows.push(row(
-            layout,
-            format!("bits of exponent and mantissa: {}", split.format),
-            format!("{exponent} and {mantissa}"),
-            format!("{} and {}", split.exponent_bits, split.mantissa_bits),
-        ));
+        rows.push(Row {
+            origin: Origin::Modelled,
+            ..row(
+                layout,
+                format!("bits of exponent and mantissa: {}", split.format),
+                format!("{exponent} and {mantissa}"),
+                format!("{} and {}", split.exponent_bits, split.mantissa_bits),
+            )
+        });
         if let Some([smallest, largest]) = range {
             rows.push(row(
                 layout,
