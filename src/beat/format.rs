@@ -105,6 +105,10 @@ macro_rules! in_format {
                 type $name = $crate::beat::format::Thesis16;
                 $work
             }
+            Some($crate::record::sixteen::Sixteen::Thesis16Literal) => {
+                type $name = $crate::beat::format::Thesis16Literal;
+                $work
+            }
         }
     };
 }
@@ -143,6 +147,9 @@ pub(crate) struct Binary16;
 /// Words of the thesis' 16-bit format.
 pub(crate) struct Thesis16;
 
+/// Words of the thesis' 16-bit format, with its encoder taken literally.
+pub(crate) struct Thesis16Literal;
+
 /// A format of two rows a beat.
 macro_rules! sixteen {
     ($format:ident) => {
@@ -173,3 +180,4 @@ macro_rules! sixteen {
 }
 sixteen!(Binary16);
 sixteen!(Thesis16);
+sixteen!(Thesis16Literal);

@@ -294,10 +294,10 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
     {
         return Err(refused("words as wide on the streams as the profile has them"));
     }
-    if profile.geometry == Geometry::Relative && numbers.collisions == StreamFormat::Thesis16 {
+    if profile.geometry == Geometry::Relative && !numbers.collisions.has_zero_and_infinity() {
         return Err(refused("a format with an infinity, which marks an absent contact point"));
     }
-    if world && numbers.bodies == StreamFormat::Thesis16 {
+    if world && !numbers.bodies.has_zero_and_infinity() {
         return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
     }
     if (numbers.rows, numbers.updates) == (Precision::F32, Precision::Binary16) {
@@ -516,12 +516,16 @@ mod tests {
         let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
         let error = error.expect_err("no zero").to_string();
         assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
-        // An absent point cannot be written in thesis16.
-        let error = with(&MIXED_REGISTERS, &[(0x144, 2)]).expect_err("no infinity").to_string();
-        assert!(
-            error.starts_with("NUMBERS is 0x00000002") && error.contains("infinity"),
-            "{error}"
-        );
+        // An absent point can be written in neither format of the thesis.
+        for format in [2, 3] {
+            let error = with(&MIXED_REGISTERS, &[(0x144, format)]).expect_err("no infinity");
+            let (error, begin) = (error.to_string(), format!("NUMBERS is 0x0000000{format}"));
+            assert!(error.starts_with(&begin) && error.contains("infinity"), "{error}");
+        }
+        let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");
+        let numbers = literal.variant.numbers;
+        let of_streams = [numbers.collisions, numbers.bodies, numbers.poses];
+        assert_eq!(of_streams, [StreamFormat::Thesis16Literal; 3]);
     }
 
     #[test]

@@ -18,7 +18,7 @@
 //! | key | values | default |
 //! |---|---|---|
 //! | `profile` | the name of a [profile](pgs_interface::profile::PROFILES) | `float` |
-//! | `format` | numbers on streams of 16 bits: `binary16`, `thesis16` | the profile's |
+//! | `format` | numbers on streams of 16 bits: `binary16`, `thesis16`, `thesis16-literal` | the profile's |
 //! | `arithmetic` | precision of the operators: `f32`, `binary16` | the profile's |
 //! | `hazards` | on a hazard wait, or read the stale velocity: `interlocked`, `unchecked` | `interlocked` |
 //! | `window` | hazard window in issue slots | the profile's |

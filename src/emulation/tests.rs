@@ -84,8 +84,8 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
         assert_eq!(
             error.to_string(),
             format!(
-                "{:?} is no option of a build: give one of binary16, thesis16, f32, \
-                 arithmetic=f32|binary16, interlocked, unchecked, window=SLOTS, keep, flush, \
+                "{:?} is no option of a build: give one of binary16, thesis16, \
+                 thesis16-literal, f32, arithmetic=f32|binary16, interlocked, unchecked, window=SLOTS, keep, flush, \
                  isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
                  address-width=BITS, threads=N, lanes=on|off",
                 text.split_once(',').expect("two words").1
@@ -101,7 +101,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
         ("float,window=", "window=: expected a whole number from 1 to 4294967295"),
         ("float,threads=0", "threads=0: expected a whole number from 1 to 31"),
         ("half,arithmetic=f64", "arithmetic=f64: expected f32 or binary16"),
-        ("half,format=f32", "format=f32: expected binary16 or thesis16"),
+        ("half,format=f32", "format=f32: expected binary16 or thesis16 or thesis16-literal"),
     ] {
         assert_eq!(build(text).expect_err(text).to_string(), expected);
     }
@@ -110,7 +110,9 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
     assert!(Build::names("colour").is_empty() && Build::default().value("colour").is_none());
 }
 
-fn any_of<T: Copy + fmt::Debug + 'static>(values: [T; 2]) -> impl Strategy<Value = Option<T>> {
+fn any_of<T: Copy + fmt::Debug + 'static, const N: usize>(
+    values: [T; N],
+) -> impl Strategy<Value = Option<T>> {
     prop::option::of(prop::sample::select(values.to_vec()))
 }
 
@@ -121,7 +123,7 @@ fn any_build() -> impl Strategy<Value = Build> {
     ];
     (
         prop::sample::select(PROFILES.to_vec()),
-        (any_of([StreamFormat::Binary16, StreamFormat::Thesis16]), any_of(Precision::ALL)),
+        (any_of(super::values::FORMATS.map(|(_, format)| format)), any_of(Precision::ALL)),
         (any_of([Inertia::Isotropic, Inertia::World]), any_of([true, false])),
         any_of([Hazards::Interlocked, Hazards::Unchecked]),
         any_of([Subnormals::Keep, Subnormals::Flush]),

@@ -11,9 +11,10 @@ use pgs_interface::profile::Inertia;
 /// A value with its name.
 type Named<T> = (&'static str, T);
 
-pub(super) const FORMATS: [Named<StreamFormat>; 2] = [
+pub(super) const FORMATS: [Named<StreamFormat>; 3] = [
     (StreamFormat::Binary16.name(), StreamFormat::Binary16),
     (StreamFormat::Thesis16.name(), StreamFormat::Thesis16),
+    (StreamFormat::Thesis16Literal.name(), StreamFormat::Thesis16Literal),
 ];
 pub(super) const PRECISIONS: [Named<Precision>; 2] =
     [(Precision::F32.name(), Precision::F32), (Precision::Binary16.name(), Precision::Binary16)];

@@ -13,13 +13,16 @@ pub(crate) enum Sixteen {
     Binary16,
     /// The thesis' format, truncated.
     Thesis16,
+    /// The thesis' format with its encoder taken literally.
+    Thesis16Literal,
 }
 
-/// [`Sixteen::narrow`] for [`Sixteen::Thesis16`]. Its code goes word by word and is too long to
-/// inline into every loop.
+/// [`Sixteen::narrow`] for the thesis' formats. Its code goes word by word and is too long to inline
+/// into every loop.
 #[inline(never)]
-fn cut(numbers: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
-    let mut narrow = numbers.map(|row| row.words().map(thesis16::narrow));
+fn cut<const LITERAL: bool>(numbers: [Lanes; 2], integers: [Option<Integer>; 2]) -> [Narrow; 2] {
+    let word = if LITERAL { thesis16::narrow_literal } else { thesis16::narrow };
+    let mut narrow = numbers.map(|row| row.words().map(word));
     for (to, integer) in narrow.iter_mut().zip(integers) {
         if let Some(integer) = integer {
             to[WORD_LANE] = integer.low();
@@ -35,6 +38,7 @@ impl Sixteen {
             StreamFormat::F32 => None,
             StreamFormat::Binary16 => Some(Self::Binary16),
             StreamFormat::Thesis16 => Some(Self::Thesis16),
+            StreamFormat::Thesis16Literal => Some(Self::Thesis16Literal),
         }
     }
 
@@ -46,7 +50,8 @@ impl Sixteen {
         let integers = rows.map(|row| row.integer);
         match self {
             Self::Binary16 => vectors.to_binary16(numbers, integers),
-            Self::Thesis16 => cut(numbers, integers),
+            Self::Thesis16 => cut::<false>(numbers, integers),
+            Self::Thesis16Literal => cut::<true>(numbers, integers),
         }
     }
 
@@ -55,7 +60,9 @@ impl Sixteen {
     pub(crate) fn widen<V: Vectors>(self, vectors: V, rows: [Narrow; 2]) -> [Lanes; 2] {
         match self {
             Self::Binary16 => vectors.to_f32(rows),
-            Self::Thesis16 => rows.map(|row| Lanes::new(row.map(thesis16::widen))),
+            Self::Thesis16 | Self::Thesis16Literal => {
+                rows.map(|row| Lanes::new(row.map(thesis16::widen)))
+            }
         }
     }
 }
@@ -66,6 +73,8 @@ mod tests {
 
     use super::*;
     use crate::simd::{Work, in_wide_vectors};
+
+    const ALL: [Sixteen; 3] = [Sixteen::Binary16, Sixteen::Thesis16, Sixteen::Thesis16Literal];
 
     fn narrowed_pair(
         format: Sixteen,
@@ -136,9 +145,9 @@ mod tests {
     }
 
     #[test]
-    fn integers_are_integers_in_either_format() {
-        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
-            // 1, -2, 50 and 3, -4, 100 are exact in both.
+    fn integers_are_integers_in_every_format() {
+        for format in ALL {
+            // 1, -2, 50 and 3, -4, 100 are exact in all.
             let rows = [[1.0, -2.0, 50.0, 1.0_f32], [3.0, -4.0, 100.0, -1.0]];
             let words = [[0x3C00, 0xC000, 0x5240, 0x3C00], [0x4200, 0xC400, 0x5640, 0xBC00]];
             let ends = || [None, Some(0), Some(1), Some(2), Some(3)];
@@ -189,7 +198,7 @@ mod tests {
         let finite = |format: Sixteen, word: u16| {
             f32::from_bits(widened(format, [word, 0, 0, 0]).0[0]).is_finite()
         };
-        for format in [Sixteen::Binary16, Sixteen::Thesis16] {
+        for format in ALL {
             for word in 0..=u16::MAX {
                 assert_eq!(finite(format, word), word & 0x7C00 != 0x7C00, "{format:?} {word:#06x}");
             }

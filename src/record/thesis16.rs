@@ -11,6 +11,9 @@
 //! accelerator writes F = 31 for every number that it cannot hold, and this module reads it as
 //! infinite.
 //!
+//! Taken literally, the encoder cuts the three bits after the exponent's top bit out of E, whatever
+//! they are: magnitudes below 2^-15 and from 2^17 on become words of other magnitudes.
+//!
 //! Source: thesis §4.6.4; interface specification, sixteen-bit numbers.
 
 /// Bits of an f32 mantissa that a word has no room for.
@@ -35,6 +38,15 @@ pub(super) fn narrow(bits: u32) -> u16 {
         clippy::cast_possible_truncation,
         reason = "a sign in bit 15, below it at most 0x7C00"
     )]
+    let word = word as u16;
+    word
+}
+
+/// [`narrow`] taken literally: the bits of the number that a word has, with no look at the others.
+#[inline(always)]
+pub(super) fn narrow_literal(bits: u32) -> u16 {
+    let word = ((bits >> 16) & 0xC000) | ((bits >> CUT) & 0x3FFF);
+    #[expect(clippy::cast_possible_truncation, reason = "both masks are below bit 16")]
     let word = word as u16;
     word
 }
@@ -87,6 +99,27 @@ mod tests {
             assert_eq!((word(value), word(-value)), (0x7C00, 0xFC00), "{value:e}");
         }
         assert_eq!(word(f32::NAN) & 0x7C00, 0x7C00);
+    }
+
+    #[test]
+    fn taken_literally_small_magnitudes_become_others() {
+        let literal = |value: f32| narrow_literal(value.to_bits());
+        // Between 2^-15 and 2^16 the words are the same.
+        for bits in 0..=u16::MAX {
+            let found = widen(bits);
+            if f32::from_bits(found).is_finite() {
+                assert_eq!((narrow_literal(found), narrow_literal(found + 0x1FFF)), (bits, bits));
+            }
+        }
+        for (value, reads) in [(0.0, -15), (2.0_f32.powi(-16), 0), (2.0_f32.powi(-30), -14)] {
+            let read = |value| f32::from_bits(widen(literal(value)));
+            let expected = 2.0_f32.powi(reads);
+            assert_eq!(
+                [read(value), read(-value)].map(f32::to_bits),
+                [expected, -expected].map(f32::to_bits)
+            );
+        }
+        assert_eq!((literal(65_536.0), literal(f32::INFINITY)), (0x7C00, 0x7C00));
     }
 
     #[test]

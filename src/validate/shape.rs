@@ -86,7 +86,7 @@ fn held(field: &'static str, variant: &Variant) -> StreamFormat {
     let numbers = &variant.numbers;
     let streamed = field == INERTIA && variant.inertia == Inertia::World;
     match numbers.bodies {
-        short @ (StreamFormat::Binary16 | StreamFormat::Thesis16) if streamed => short,
+        short if streamed && short.bits() == 16 => short,
         _ if computes_short(numbers) => StreamFormat::Binary16,
         _ if streamed && numbers.velocities == Precision::Binary16 => StreamFormat::Binary16,
         _ => StreamFormat::F32,

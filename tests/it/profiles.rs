@@ -281,6 +281,35 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
 }
 
+/// The encoder cuts three bits out of the exponent: what is too small for the format becomes large.
+#[test]
+#[expect(clippy::float_cmp, reason = "the values are exact")]
+fn taken_literally_the_format_of_the_thesis_makes_small_numbers_large() {
+    let literal = StreamFormat::Thesis16Literal;
+    let numbers = Numbers { collisions: literal, bodies: literal, poses: literal, ..THESIS16 };
+    let after = |numbers| {
+        let (_, mut accelerator) = open(BoardConfig { numbers: Some(numbers), ..of(&HALF) });
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+        accelerator.set_shapes(&shapes).expect("shapes that fit");
+        let mut bodies = vec![at_rest([2.0_f32.powi(-16), -0.75 * 2.0_f32.powi(-15), 4.0], 1)];
+        bodies[0].velocity.linear = [0.0, -2.0_f32.powi(-20), 0.5];
+        let parameters = StepParameters::default().with_gravity([0.0; 3]);
+        let none: &[Collision] = &[];
+        accelerator
+            .step(&mut bodies, none, &parameters.with_integrate(false))
+            .expect("numbers that the format carries");
+        bodies[0]
+    };
+    let smallest = 2.0_f32.powi(-15);
+    let (cut, kept) = (after(numbers), after(THESIS16));
+    assert_eq!(kept.pose.position, [smallest, -smallest, 4.0]);
+    // 1.5 x 2^-16 has the exponent of 1.
+    assert_eq!(cut.pose.position, [1.0, -1.5, 4.0]);
+    assert_eq!(kept.velocity.linear, [smallest, -smallest, 0.5]);
+    assert_eq!(cut.velocity.linear, [smallest, -0.0625, 0.5]);
+    assert_eq!(cut.pose.orientation, kept.pose.orientation);
+}
+
 /// A result beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).
 #[test]
 fn results_that_sixteen_bits_cannot_hold_are_a_fault_and_change_nothing() {

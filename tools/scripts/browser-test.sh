@@ -45,7 +45,7 @@ if [ ${#pages[@]} = 0 ]; then
 	export PGS_BOARD=emulated
 	attend "$pgs" run --grid 6x5x6 --steps 120 --view "$work/cubes.html" > /dev/null
 	attend "$pgs" run --scene shapes --grid 4x4x4 --steps 180 --view "$work/shapes.html" > /dev/null
-	# The golden step is small; of Bullet's full step the report takes minutes less than of a pile of our own.
+	# The golden step is small. A report on Bullet's full step is minutes shorter than one on our own pile.
 	input=tests/golden/pile5_step60
 	[ -z "${PGS_VECTORS-}" ] || input=$PGS_VECTORS/full_step186
 	SECONDS=0

@@ -13,6 +13,7 @@ set -euo pipefail
 . "$repository/tools/scripts/packages-env.sh"
 cd "$repository"
 
+command -v dpkg-deb >/dev/null || skip "needs dpkg: this is no Debian, and no system like it"
 [ $# -le 1 ] || { sed -n '2,/^set /s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 case ${1-} in
 amd64 | arm64) architecture=$1 ;;

@@ -97,8 +97,9 @@ put 644 device-tree/99-zynq-pgs.rules usr/lib/udev/rules.d/99-zynq-pgs.rules
 put 644 $sources/systemd/pgs-serve.service usr/lib/systemd/system/pgs-serve.service
 put 644 $sources/systemd/pgs-serve.default etc/default/pgs-serve
 
-put 644 README.md "$documents/README.md"
-for page in docs/*.md docs/*.svg device-tree/README.md; do put 644 "$page" "$documents/$page"; done
+# The pages with all that they link to: no link leads out of the package.
+linked=$(python3 -B $sources/pages.py) || fail "a page links to a missing file, as above"
+for page in $linked; do put 644 "$page" "$documents/$page"; done
 for example in tools/capi/examples/*; do put 644 "$example" "$documents/examples/${example##*/}"; done
 put 644 $sources/debian/copyright "$documents/copyright"
 python3 -B $sources/licences.py "$rust_target" pgs zynq-pgs-c > "$tree/$documents/third-party.txt"

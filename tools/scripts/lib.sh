@@ -1,4 +1,4 @@
-# This file holds what the scripts of this folder share. To be sourced by bash.
+# Functions and variables that the scripts of this folder share. To be sourced by bash.
 
 # The exit code of a script that cannot do its work on this machine, and says why.
 readonly SKIPPED=77

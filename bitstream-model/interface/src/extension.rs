@@ -92,10 +92,10 @@ impl Extensions {
             spin_damping: true,
             kinematic: matches!(profile.flow, Flow::Passes)
                 && absolute
-                && !matches!(numbers.bodies, StreamFormat::Thesis16),
+                && numbers.bodies.has_zero_and_infinity(),
             pair_friction,
             warm_start: profile.stripes.warm_collisions.is_some()
-                && !matches!(numbers.collisions, StreamFormat::Thesis16),
+                && numbers.collisions.has_zero_and_infinity(),
             streamed_masses: matches!(inertia, Inertia::World)
                 && matches!(profile.flow, Flow::Passes)
                 && matches!(numbers.bodies, StreamFormat::F32),

@@ -20,18 +20,25 @@ pub enum StreamFormat {
     /// becomes the word 0 with its sign, which reads as 2^-15; a magnitude of 2^16 or more,
     /// infinity and NaN become F = 31.
     Thesis16 = 2,
+    /// [`Thesis16`](Self::Thesis16) with the encoder taken literally: it cuts three bits out of the
+    /// exponent whatever they are. Words are read alike.
+    ///
+    /// From 2^-15 up to 2^16 the words are those of thesis16. A smaller magnitude has its exponent
+    /// modulo 16 and reads as a number from 2^-15 up to 2: 2^-16 as 1, zero as 2^-15. A magnitude of
+    /// 2^17 or more reads as one from 2 up to 2^17.
+    Thesis16Literal = 3,
 }
 
 impl StreamFormat {
     /// All formats.
-    pub const ALL: [Self; 3] = [Self::F32, Self::Binary16, Self::Thesis16];
+    pub const ALL: [Self; 4] = [Self::F32, Self::Binary16, Self::Thesis16, Self::Thesis16Literal];
 
     /// Bits of a word.
     #[must_use]
     pub const fn bits(self) -> u32 {
         match self {
             Self::F32 => 32,
-            Self::Binary16 | Self::Thesis16 => 16,
+            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 16,
         }
     }
 
@@ -48,7 +55,7 @@ impl StreamFormat {
         match self {
             Self::F32 => f32::MAX,
             // 0x7BFF; in thesis16 the next word, 65536, reads as overflow.
-            Self::Binary16 | Self::Thesis16 => 65_504.0,
+            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 65_504.0,
         }
     }
 
@@ -57,8 +64,14 @@ impl StreamFormat {
     pub const fn largest_index(self) -> u32 {
         match self {
             Self::F32 => u32::MAX,
-            Self::Binary16 | Self::Thesis16 => 0xFFFF,
+            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 0xFFFF,
         }
+    }
+
+    /// Whether the format has words for zero and for infinity, as IEEE 754 has them.
+    #[must_use]
+    pub const fn has_zero_and_infinity(self) -> bool {
+        matches!(self, Self::F32 | Self::Binary16)
     }
 
     /// Name on the command line and in reports.
@@ -68,6 +81,7 @@ impl StreamFormat {
             Self::F32 => "f32",
             Self::Binary16 => "binary16",
             Self::Thesis16 => "thesis16",
+            Self::Thesis16Literal => "thesis16-literal",
         }
     }
 }

@@ -172,7 +172,9 @@ impl Accelerator {
         let precision = match numbers.poses {
             // A position in f32 moves by less than a binary16 step.
             StreamFormat::F32 => Precision::F32,
-            StreamFormat::Binary16 | StreamFormat::Thesis16 => numbers.updates,
+            StreamFormat::Binary16 | StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
+                numbers.updates
+            }
         };
         let step = match (precision, self.config.subnormals) {
             (Precision::F32, Subnormals::Keep) => integrate::<Single>,

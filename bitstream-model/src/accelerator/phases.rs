@@ -352,14 +352,17 @@ impl Accelerator {
     /// The next collision.
     #[inline]
     pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
-        use StreamFormat::{Binary16, F32, Thesis16};
+        use StreamFormat::{Binary16, F32, Thesis16, Thesis16Literal};
         match (self.variant.profile.geometry, self.variant.numbers.collisions) {
             (Geometry::Absolute, F32) if self.arguments.solver.pair_friction => {
                 Collision::with_friction(&reader.record())
             }
             (Geometry::Absolute, F32) => Collision::absolute(F32, &reader.record()),
             (Geometry::Absolute, Binary16) => Collision::absolute(Binary16, &reader.record()),
-            (Geometry::Absolute, Thesis16) => Collision::absolute(Thesis16, &reader.record()),
+            // Words of both are read alike.
+            (Geometry::Absolute, Thesis16 | Thesis16Literal) => {
+                Collision::absolute(Thesis16, &reader.record())
+            }
             (Geometry::Relative, Binary16) => Collision::relative(Binary16, &reader.record()),
             (Geometry::Relative, format) => Collision::relative(format, &reader.record()),
         }

@@ -13,7 +13,7 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::extension::Extensions;
-use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
 use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::Stripe;
@@ -203,16 +203,16 @@ pub enum ConfigError {
     },
     /// A format without infinity, the distance of an unused contact point.
     #[error(
-        "collisions relative to body A in thesis16, which has no infinity to mark an unused contact \
+        "collisions relative to body A in {0}, which has no infinity to mark an unused contact \
          point with; expected f32 or binary16"
     )]
-    NoInfinity,
+    NoInfinity(&'static str),
     /// World inertia in a format without zero, which static bodies need.
     #[error(
-        "world inertia in thesis16, which has no zero for the inverse inertia of a static body; \
+        "world inertia in {0}, which has no zero for the inverse inertia of a static body; \
          expected f32 or binary16"
     )]
-    NoZero,
+    NoZero(&'static str),
     /// Constraint rows of higher precision than the updates that use them.
     #[error(
         "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
@@ -363,11 +363,11 @@ impl BoardConfig {
             }
         }
         let relative = self.profile.geometry == Geometry::Relative;
-        if relative && asked.collisions == StreamFormat::Thesis16 {
-            return Err(ConfigError::NoInfinity);
+        if relative && !asked.collisions.has_zero_and_infinity() {
+            return Err(ConfigError::NoInfinity(asked.collisions.name()));
         }
-        if self.inertia == Inertia::World && asked.bodies == StreamFormat::Thesis16 {
-            return Err(ConfigError::NoZero);
+        if self.inertia == Inertia::World && !asked.bodies.has_zero_and_infinity() {
+            return Err(ConfigError::NoZero(asked.bodies.name()));
         }
         if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
             return Err(ConfigError::RowsBeyondUpdates);

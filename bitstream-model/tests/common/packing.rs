@@ -31,6 +31,11 @@ pub(crate) fn encode(format: StreamFormat, value: f32) -> u32 {
             let (top, low) = (bits >> 30 & 1, bits >> 23 & 0xF);
             sign | (top << 14) | (low << 10) | (bits >> 13 & 0x3FF)
         }
+        StreamFormat::Thesis16Literal => {
+            let [sign, top] = [value.to_bits() >> 31, value.to_bits() >> 30 & 1];
+            let low = value.to_bits() >> 23 & 0xF;
+            (sign << 15) | (top << 14) | (low << 10) | (value.to_bits() >> 13 & 0x3FF)
+        }
     }
 }
 
@@ -40,7 +45,7 @@ pub(crate) fn decode(format: StreamFormat, word: u32) -> f32 {
     match format {
         StreamFormat::F32 => f32::from_bits(word),
         StreamFormat::Binary16 => f16::from_bits(half()).to_f32(),
-        StreamFormat::Thesis16 => {
+        StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
             let sign = if half() >> 15 == 0 { 1.0 } else { -1.0 };
             let exponent = i32::from(half() >> 10 & 31) - 15;
             sign * (1.0 + f32::from(half() & 0x3FF) / 1024.0) * 2.0_f32.powi(exponent)

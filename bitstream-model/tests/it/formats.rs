@@ -137,6 +137,32 @@ fn thesis16_has_no_zero_and_stops_at_both_ends() {
     assert_eq!(encode(THESIS16, y) >> 10, 31, "{y} reads as overflow");
 }
 
+/// A number that lost three bits of its exponent reads as another one, and no word says so.
+#[test]
+fn thesis16_taken_literally_gives_other_numbers_at_both_ends() {
+    let literal = StreamFormat::Thesis16Literal;
+    let streams =
+        Numbers { collisions: literal, bodies: literal, poses: literal, ..THESIS16_STREAMS };
+    let body = Body {
+        position: [0.0, -0.0, 2.0_f32.powi(-16)],
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        linear: [-0.1, 60_000.0, -3.05e-5],
+        angular: [0.3, -1.0, 4096.5],
+        ..AT_REST
+    };
+    let scene = Step { integrate: false, ..Step::new(vec![body], Vec::new()) };
+    let found = run(config(&HALF, streams), &scene).bodies[0];
+    let smallest = 2.0_f32.powi(-15);
+    assert_eq!(found.position.map(f32::to_bits), [smallest, -smallest, 1.0].map(f32::to_bits));
+    assert_eq!(bits(&found), bits(&mapped(&body, carried(literal))));
+    // -3.05e-5 is below 2^-15 and loses a factor of 2^-16.
+    assert!(found.linear[2] < -1.9, "{:?}", found.linear);
+    // 60,000 and half a second of 160,000 m/s2 are 140,000, of which 2^16 is lost.
+    let fast = Step { gravity: [0.0, 160_000.0, 0.0], integrate: true, ..scene };
+    let [_, y, _] = run(config(&HALF, streams), &fast).bodies[0].linear;
+    assert!((2.0..3.0).contains(&y), "{y}");
+}
+
 #[test]
 fn binary16_results_beyond_its_range_are_infinite() {
     let body = Body { linear: [0.0, 60_000.0, -60_000.0], ..AT_REST };

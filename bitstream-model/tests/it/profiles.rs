@@ -29,10 +29,11 @@ fn variants() -> Vec<Variant> {
             variants.push(Variant { profile, numbers: own, inertia });
         }
     }
-    let thesis = StreamFormat::Thesis16;
-    let numbers =
-        Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
-    variants.push(Variant { profile: &HALF, numbers, inertia: Inertia::Isotropic });
+    for thesis in [StreamFormat::Thesis16, StreamFormat::Thesis16Literal] {
+        let numbers =
+            Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
+        variants.push(Variant { profile: &HALF, numbers, inertia: Inertia::Isotropic });
+    }
     let numbers = Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 };
     let half = StreamFormat::Binary16;
     let numbers = Numbers { bodies: half, poses: half, ..numbers };
@@ -65,7 +66,7 @@ fn states(outcome: &Outcome) -> Vec<[[u32; 4]; 4]> {
 #[test]
 fn bodies_fall_alike_on_every_profile_whatever_their_number() {
     for variant in variants() {
-        if variant.numbers.bodies == StreamFormat::Thesis16 {
+        if !variant.numbers.bodies.has_zero_and_infinity() {
             continue;
         }
         let mut machine = unlimited(&variant);
@@ -82,7 +83,7 @@ fn bodies_fall_alike_on_every_profile_whatever_their_number() {
 #[test]
 fn masses_on_the_ground_stop_alike_on_every_profile_whatever_their_number() {
     for variant in variants() {
-        if variant.numbers.bodies == StreamFormat::Thesis16 {
+        if !variant.numbers.bodies.has_zero_and_infinity() {
             continue;
         }
         for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
@@ -341,7 +342,7 @@ fn unchecked_a_write_back_is_seen_from_the_issue_a_window_later_on() {
 #[test]
 fn padding_changes_nothing_wherever_it_stands() {
     for variant in variants() {
-        if variant.numbers.collisions == StreamFormat::Thesis16 {
+        if !variant.numbers.collisions.has_zero_and_infinity() {
             continue;
         }
         let mut machine = unlimited(&variant);
@@ -438,11 +439,14 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
         refusal(BoardConfig { numbers: Some(numbers), ..config(profile) })
     };
     let thesis = StreamFormat::Thesis16;
-    let text = with(&MIXED, Numbers { collisions: thesis, ..MIXED.numbers });
-    assert!(text.contains("thesis16") && text.contains("expected f32 or binary16"), "{text}");
-    let numbers = Some(Numbers { bodies: thesis, ..HALF.numbers });
-    let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
-    assert!(text.contains("thesis16, which has no zero"), "{text}");
+    for format in [thesis, StreamFormat::Thesis16Literal] {
+        let text = with(&MIXED, Numbers { collisions: format, ..MIXED.numbers });
+        let expected = format!("in {}, which has no infinity", format.name());
+        assert!(text.contains(&expected) && text.contains("expected f32 or binary16"), "{text}");
+        let numbers = Some(Numbers { bodies: format, ..HALF.numbers });
+        let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
+        assert!(text.contains(&format!("in {}, which has no zero", format.name())), "{text}");
+    }
     let text = with(&FLOAT, Numbers { bodies: thesis, ..Numbers::F32 });
     assert!(text.contains("velocity records of 16 bits a number, expected 32"), "{text}");
     let text = with(&HALF, Numbers::F32);

@@ -200,9 +200,7 @@ mod tests {
                 &[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[0, 0, 0, 1, 1, 1, 2], &[2], &[0, 1],
             ]),
             padded in any::<bool>(),
-            format in prop::sample::select(vec![
-                StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16,
-            ]),
+            format in prop::sample::select(StreamFormat::ALL.to_vec()),
         ) {
             let layout = Layout { rows: ROWS, format, stripe: Stripe { streams, padded } };
             // The segments are full of ones, so that a missing beat shows.

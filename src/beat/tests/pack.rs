@@ -59,6 +59,7 @@ enum Words {
     F32,
     Binary16,
     Thesis16,
+    Thesis16Literal,
 }
 
 /// A bitstream as the specification describes it.
@@ -120,6 +121,20 @@ const THESIS_SPEC: Spec = Spec {
     bodies: Words::Thesis16,
     ..HALF_SPEC
 };
+const LITERAL_SPEC: Spec = Spec {
+    variant: Variant {
+        numbers: Numbers {
+            collisions: StreamFormat::Thesis16Literal,
+            bodies: StreamFormat::Thesis16Literal,
+            poses: StreamFormat::Thesis16Literal,
+            ..HALF.numbers
+        },
+        ..HALF.default_variant()
+    },
+    collisions: Words::Thesis16Literal,
+    bodies: Words::Thesis16Literal,
+    ..HALF_SPEC
+};
 const MIXED_SPEC: Spec = Spec {
     variant: MIXED.default_variant(),
     channels: 3,
@@ -145,7 +160,7 @@ const WINDOWED16_SPEC: Spec = Spec {
 };
 
 fn any_spec() -> impl Strategy<Value = Spec> {
-    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, MIXED_SPEC];
+    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, LITERAL_SPEC, MIXED_SPEC];
     (prop::sample::select(specs), any::<bool>()).prop_map(|(spec, world)| {
         let inertia = if world { Inertia::World } else { Inertia::Isotropic };
         Spec { variant: Variant { inertia, ..spec.variant }, world, ..spec }
@@ -158,6 +173,7 @@ fn word(words: Words, value: f32) -> u32 {
         Words::F32 => value.to_bits(),
         Words::Binary16 => half::f16::from_f32(value).to_bits().into(),
         Words::Thesis16 => thesis(value),
+        Words::Thesis16Literal => literal(value),
     }
 }
 
@@ -175,6 +191,13 @@ fn thesis(value: f32) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1023")]
     let mantissa = mantissa as u32;
     sign | (u32::try_from(f).expect("0 to 30") << 10) | mantissa
+}
+
+/// Sign, the exponent's top bit and four low bits, and the mantissa's ten top bits.
+fn literal(value: f32) -> u32 {
+    let bits = value.to_bits();
+    let [sign, top, low] = [bits >> 31, bits >> 30 & 1, bits >> 23 & 15];
+    sign << 15 | top << 14 | low << 10 | bits >> 13 & 1023
 }
 
 /// The rows of a segment in their order, and the number of beats.

@@ -194,7 +194,7 @@ fn a_pile_is_found_good_at_once() {
     let piles = [pile(|at| 1 + at % 4), pile(|at| if at % 60 == 0 { 2 } else { 4 })];
     let entries = (0..298).map(|at| (at % 90 != 89).then_some(at));
     let schedule: Schedule = entries.chain((0..298).filter(|at| at % 90 == 89).map(Some)).collect();
-    let formats = [StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
+    let formats = StreamFormat::ALL;
     for profile in PROFILES {
         for inertia in [Inertia::Isotropic, Inertia::World] {
             for format in formats {

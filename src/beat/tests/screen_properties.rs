@@ -12,7 +12,7 @@ use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED, WINDO
 fn any_limits() -> impl Strategy<Value = Limits> {
     let profiles = vec![&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
     let short_rows = vec![Precision::F32, Precision::Binary16];
-    let formats = vec![StreamFormat::F32, StreamFormat::Binary16, StreamFormat::Thesis16];
+    let formats = StreamFormat::ALL.to_vec();
     (
         prop::sample::select(profiles),
         prop::option::of((prop::sample::select(short_rows), prop::sample::select(formats))),

@@ -45,10 +45,12 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
 }
 
 fn variant(input: &mut Input<'_>) -> Variant {
-    let thesis = StreamFormat::Thesis16;
-    let choice = input.index(2 * PROFILES.len() + 1);
+    let choice = input.index(2 * PROFILES.len() + 2);
     match PROFILES.get(choice / 2) {
         None => {
+            let literal = choice.is_multiple_of(2);
+            let thesis =
+                if literal { StreamFormat::Thesis16Literal } else { StreamFormat::Thesis16 };
             let numbers =
                 Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
             Variant { numbers, ..HALF.default_variant() }

@@ -27,14 +27,15 @@ impl NarrowFormat {
             StreamFormat::F32 => None,
             StreamFormat::Binary16 => Some(Self::Binary16),
             StreamFormat::Thesis16 => Some(Self::Thesis16),
+            StreamFormat::Thesis16Literal => Some(Self::Thesis16Literal),
         }
     }
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
-            Self::Binary16 => "binary16",
-            Self::Thesis16 => "thesis16",
-            Self::Thesis16Literal => "thesis16-literal",
+            Self::Binary16 => StreamFormat::Binary16.name(),
+            Self::Thesis16 => StreamFormat::Thesis16.name(),
+            Self::Thesis16Literal => StreamFormat::Thesis16Literal.name(),
             Self::Split { .. } => "split",
         }
     }
@@ -89,7 +90,11 @@ fn thesis16(value: f32) -> f32 {
 
 /// Rounds a number as the streams of this format do; one that the driver refuses stays as it is.
 pub(crate) fn carried(stream: StreamFormat, value: f32) -> f32 {
-    NarrowFormat::of(stream).and_then(|format| format.round_trip(value)).unwrap_or(value)
+    let taken = |_: &NarrowFormat| value.abs() <= stream.largest();
+    NarrowFormat::of(stream)
+        .filter(taken)
+        .and_then(|format| format.round_trip(value))
+        .unwrap_or(value)
 }
 
 /// Bits of a number behind its sign.

@@ -1,4 +1,4 @@
-//! Conversions between f32 and the two sixteen-bit formats, on the bits.
+//! Conversions between f32 and the sixteen-bit formats, on the bits.
 
 const SIGN: u32 = 0x8000_0000;
 const INFINITY: u32 = 0x7F80_0000;
@@ -90,6 +90,13 @@ pub(crate) fn to_thesis16(value: f32) -> u32 {
     sign | word.min(0x7FFF)
 }
 
+/// The word of a number in thesis16 taken literally: the sign, the top and the four low bits of the
+/// exponent, the ten top bits of the mantissa, whatever the three bits between are.
+pub(crate) fn to_thesis16_literal(value: f32) -> u32 {
+    let bits = value.to_bits();
+    ((bits >> 16) & 0xC000) | ((bits >> EXTRA_BITS) & 0x3FFF)
+}
+
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the values are exact")]
 mod tests {
@@ -171,5 +178,23 @@ mod tests {
             assert_eq!(to_thesis16(value) >> 10, 31, "{value}");
             assert_eq!(to_thesis16(-value) >> 10, 63, "{value}");
         }
+    }
+
+    /// Compares with the written definition, in numbers: exponents that differ by 16 share a word.
+    #[test]
+    fn taken_literally_an_exponent_is_known_up_to_multiples_of_16() {
+        for word in 0..=u16::MAX {
+            let value = from_thesis16(word.into());
+            assert_eq!(to_thesis16_literal(value), u32::from(word), "{word:04x}");
+            let last = f32::from_bits(value.to_bits() + 0x1FFF);
+            assert_eq!(to_thesis16_literal(last), u32::from(word), "{word:04x}");
+            let [small, large] = [-16, 16].map(|by| f64::from(value) * f64::from(by).exp2());
+            #[expect(clippy::cast_possible_truncation, reason = "eleven bits, exact")]
+            let found = if value.abs() < 2.0 { small as f32 } else { large as f32 };
+            assert_eq!(to_thesis16_literal(found), u32::from(word), "{found:e}");
+        }
+        assert_eq!((to_thesis16_literal(0.0), to_thesis16_literal(-0.0)), (0, 0x8000));
+        assert_eq!(to_thesis16_literal(f32::INFINITY), 0x7C00);
+        assert_eq!(to_thesis16_literal(f32::NAN) >> 10, 31);
     }
 }

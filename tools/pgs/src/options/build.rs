@@ -15,7 +15,8 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_name = "PROFILE", value_parser = profile())]
     profile: Option<&'static Profile>,
     /// Numbers on streams of 16 bits: binary16 is IEEE 754, rounded to nearest even; thesis16 is the
-    /// thesis' own, rounded by truncation, and has no zero [default: binary16]
+    /// thesis' own, rounded by truncation, and has no zero; thesis16-literal cuts bits out of the
+    /// exponent even where a small number becomes a large one [default: binary16]
     #[arg(long, value_parser = choice("format", |build| build.format))]
     format: Option<StreamFormat>,
     /// Precision of the pipeline's operators; storage keeps the width of the profile [default: the

@@ -123,7 +123,9 @@ fn sixteen_bits_are_compared_with_float_as_compare_does() {
     let input = golden("pile5_step61");
     let input = text(&input);
     let document = study(&["half", "--input", input]);
-    for (place, build) in ["half", "half,thesis16", "mixed"].into_iter().enumerate() {
+    for (place, build) in
+        ["half", "half,thesis16", "half,thesis16-literal", "mixed"].into_iter().enumerate()
+    {
         let of_build = &document["builds"][place];
         assert_eq!(of_build["build"], build);
         let compared = run(["compare", "float", build, "--input", input, "--json"]).json();
@@ -137,7 +139,7 @@ fn sixteen_bits_are_compared_with_float_as_compare_does() {
     }
     // `pgs formats` measures the same numbers.
     let formats = run(["formats", "--input", input, "--json"]).json();
-    for (place, name) in ["binary16", "thesis16"].into_iter().enumerate() {
+    for (place, name) in ["binary16", "thesis16", "thesis16-literal"].into_iter().enumerate() {
         let split = &document["splits"][place];
         assert_eq!(split["format"], name);
         let expected = number(&formats["each_once"]["formats"][name]["relative_mean_percent"]);

@@ -140,7 +140,8 @@ impl Part<'_> {
             StreamFormat::Binary16 => {
                 self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Binary16);
             }
-            StreamFormat::Thesis16 => {
+            // Words of both are read alike.
+            StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
                 self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Thesis16);
             }
         }

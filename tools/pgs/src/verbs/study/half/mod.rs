@@ -46,9 +46,12 @@ pub(crate) struct Options {
     #[command(flatten)]
     pub(crate) start: StartArgs,
     /// A build to step beside float; can be given several times
-    #[arg(long = "build", value_name = "BUILD", default_values = ["half", "half,thesis16", "mixed"])]
+    #[arg(long = "build", value_name = "BUILD", default_values = DEFAULTS)]
     pub(crate) builds: Vec<Build>,
 }
+
+/// The builds beside float, unless others are given.
+const DEFAULTS: [&str; 4] = ["half", "half,thesis16", "half,thesis16-literal", "mixed"];
 
 /// The build that the others are compared with.
 const ORIGINAL: &str = "float";

@@ -11,7 +11,7 @@ use crate::output::table::{Column, heading, line};
 
 const COLUMNS: [Column; 9] = [
     Column { name: "step", unit: "", width: 5 },
-    Column { name: "build", unit: "", width: 15 },
+    Column { name: "build", unit: "", width: 22 },
     Column { name: "energy", unit: "kJ", width: 9 },
     Column { name: "energy", unit: "x float", width: 9 },
     Column { name: "position", unit: "% mean", width: 9 },
@@ -22,7 +22,7 @@ const COLUMNS: [Column; 9] = [
 ];
 
 const SPLITS: [Column; 7] = [
-    Column { name: "format", unit: "", width: 10 },
+    Column { name: "format", unit: "", width: 17 },
     Column { name: "exponent", unit: "bits", width: 9 },
     Column { name: "mantissa", unit: "bits", width: 9 },
     Column { name: "smallest", unit: "", width: 9 },

@@ -49,6 +49,7 @@ pub(super) fn of(numbers: &[f32]) -> Vec<Split> {
     let given = [
         split(NarrowFormat::Binary16, 5, power(-14)),
         split(NarrowFormat::Thesis16, 5, power(-15)),
+        split(NarrowFormat::Thesis16Literal, 5, power(-15)),
     ];
     let tried = EXPONENTS.map(|exponent| {
         let format = NarrowFormat::Split { exponent, top };
