@@ -26,6 +26,7 @@ mod output;
 #[cfg(feature = "pages")]
 mod pages;
 mod permutation;
+mod pile;
 mod power;
 mod step_input;
 mod traced;

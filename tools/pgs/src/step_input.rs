@@ -5,6 +5,7 @@ use std::path::Path;
 use thiserror::Error;
 use zynq_pgs::{Accelerator, Excess, InputError, InputItem, OutOfRange, Shape};
 
+use crate::board::OpenBoard;
 use crate::failure::Failure;
 use step_folder::folder::{
     BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
@@ -43,6 +44,18 @@ pub(crate) fn locate(source: zynq_pgs::Error, folder: &Folder) -> Located {
         _ => folder.path.display().to_string(),
     };
     Located { place, source }
+}
+
+/// Makes a failure of the driver's error; for a folder's step, with the array at fault.
+pub(crate) fn failure(
+    folder: Option<&Folder>,
+    opened: &OpenBoard,
+    error: zynq_pgs::Error,
+) -> Failure {
+    match folder {
+        Some(folder) if error.is_input() => Failure::input(locate(error, folder)),
+        _ => opened.failure(error),
+    }
 }
 
 fn place(error: &InputError, folder: &Path, shape_bodies: &[usize]) -> String {

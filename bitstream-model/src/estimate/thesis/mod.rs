@@ -8,10 +8,19 @@ pub mod data;
 pub mod euler;
 pub mod recorded;
 
+use super::cycles::StepShape;
+
 /// Bodies of the thesis' step: the moving ones.
 pub const BODIES: u64 = 38_880;
 /// Collisions of the thesis' step.
 pub const COLLISIONS: u64 = 127_000;
+
+/// The thesis' step. It prints bodies and collisions; [`StepShape::new`] tells where its number of
+/// passes comes from.
+#[must_use]
+pub const fn step() -> StepShape {
+    StepShape::new(BODIES, COLLISIONS)
+}
 
 /// Speed-up of a whole whose share `p` becomes `s` times as fast (equation 6.5).
 #[must_use]

@@ -1,5 +1,5 @@
-//! Figures that the thesis reports of its designs and of other machines (§4.4.2, Tables 6.4 to
-//! 6.11, equation 6.5).
+//! Figures that the thesis reports of its designs and of other machines (§4.4.2, §5.4.4, §5.5, Tables
+//! 6.1 to 6.11, equation 6.5).
 
 use crate::config::Bandwidth;
 use pgs_interface::profile::{FLOAT, HALF, Profile};
@@ -35,6 +35,11 @@ pub const CPU: Platform =
 pub const MEMORY_BANDWIDTH: Bandwidth = Bandwidth::BytesPerSecond(16_000_000_000);
 /// Power of the ZCU102 that the thesis calculates with, W: its maximum, not measured.
 pub const ZCU102_WATTS: f64 = 15.0;
+/// Cycles from an issue of the half design to the next before its second copy of the velocities
+/// (§5.5.2).
+pub const ONE_COPY_INTERVAL: u32 = 4;
+/// Block RAM of the device (Table 6.1), MB.
+pub const DEVICE_MEGABYTES: u32 = 4;
 /// Share of a whole step that the accelerator takes over (§4.4).
 pub const ACCELERATED_SHARE: f64 = 0.6;
 
@@ -52,6 +57,8 @@ pub struct Over {
 pub struct Design {
     /// The profile that describes it.
     pub profile: &'static Profile,
+    /// Section of its results.
+    pub section: &'static str,
     /// Table of its cycles and resources.
     pub results: &'static str,
     /// Table of its latency and energy.
@@ -60,8 +67,12 @@ pub struct Design {
     pub speedups: &'static str,
     /// Table of its efficiency.
     pub efficiencies: &'static str,
+    /// Cycles from an issue to the next (§5.4.4, §5.5.3).
+    pub initiation_interval: u32,
     /// Clock cycles of a step.
     pub cycles: u64,
+    /// Clock, MHz.
+    pub clock_mhz: u32,
     /// Block RAMs of 18 Kib used, percent of the device.
     pub block_ram: u32,
     /// DSP48E used, percent.
@@ -91,11 +102,14 @@ pub struct Design {
 /// The single-precision design (§5.4).
 pub const FLOAT_DESIGN: Design = Design {
     profile: &FLOAT,
+    section: "§6.4",
     results: "T6.4",
     comparison: "T6.5",
     speedups: "T6.6",
     efficiencies: "T6.7",
+    initiation_interval: 2,
     cycles: 2_062_697,
+    clock_mhz: 275,
     block_ram: 70,
     dsp: 42,
     flip_flops: 32,
@@ -113,11 +127,14 @@ pub const FLOAT_DESIGN: Design = Design {
 /// The half-precision design (§5.5).
 pub const HALF_DESIGN: Design = Design {
     profile: &HALF,
+    section: "§6.5",
     results: "T6.8",
     comparison: "T6.9",
     speedups: "T6.10",
     efficiencies: "T6.11",
+    initiation_interval: 3,
     cycles: 1_557_317,
+    clock_mhz: 250,
     block_ram: 48,
     dsp: 42,
     flip_flops: 29,
@@ -132,7 +149,8 @@ pub const HALF_DESIGN: Design = Design {
     whole_step: 1.48,
 };
 
-/// Both designs. The thesis reports no figures of its first design ([`NAIVE`]).
+/// Both designs. Of its first design ([`NAIVE`]) the thesis prints no numbers: Figures 6.1 and 6.2
+/// chart it.
 ///
 /// [`NAIVE`]: pgs_interface::profile::NAIVE
 pub const DESIGNS: [&Design; 2] = [&FLOAT_DESIGN, &HALF_DESIGN];

@@ -82,6 +82,19 @@ pub(crate) fn check_rows(grid: Grid) -> Result<(), Failure> {
     Err(Failure::input(error).next("give a smaller --grid"))
 }
 
+/// Refuses a grid that does not fit, before memory is allocated for it.
+pub(crate) fn check_size(grid: Grid, capabilities: &Capabilities) -> Result<(), Failure> {
+    let capacity = capabilities.body_capacity;
+    if grid.cubes() < capacity {
+        return Ok(());
+    }
+    let error = format!(
+        "a grid of {grid} is {} bodies with the ground, the board takes at most {capacity}",
+        u64::from(grid.cubes()) + 1
+    );
+    Err(Failure::input(error).next("give a smaller --grid"))
+}
+
 impl SceneArgs {
     /// Builds the scene. Detection uses as many threads as the emulated board may.
     pub(crate) fn build(&self, board: &Build) -> Result<Scene, Failure> {
@@ -126,17 +139,7 @@ impl SceneArgs {
 
     /// Refuses a grid that does not fit, before memory is allocated for it.
     pub(crate) fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
-        let capacity = capabilities.body_capacity;
-        let grid = self.grid();
-        if grid.cubes() < capacity {
-            return Ok(());
-        }
-        let error = format!(
-            "a grid of {} is {} bodies with the ground, the board takes at most {capacity}",
-            grid,
-            u64::from(grid.cubes()) + 1
-        );
-        Err(Failure::input(error).next("give a smaller --grid"))
+        check_size(self.grid(), capabilities)
     }
 
     /// Gives the shapes their frictions, which a step takes from each collision or from the table of shapes.

@@ -161,6 +161,26 @@ fn a_pile_in_half_keeps_moving_and_a_mixed_one_does_not() {
     assert_eq!(document["float_kinetic_energy_j"].as_array().map(Vec::len), Some(151));
 }
 
+/// Verbs that step a pile to a state lead to the same one: `formats` counts the step that it measures, a
+/// study the steps before, and `half` shows the numbers of the step behind its last.
+#[test]
+fn a_step_of_the_pile_is_the_same_in_every_verb() {
+    let formats = run(["formats", "--grid", "4x4x4", "--step", "50", "--json"]).json();
+    let scene = ["--grid", "4x4x4", "--from", "48", "--steps", "1", "--build", "mixed"];
+    let half = study(&[&["half"], &scene[..]].concat());
+    for place in 0..2 {
+        let split = &half["splits"][place];
+        let name = split["format"].as_str().expect("a name");
+        let loss = &formats["each_once"]["formats"][name];
+        assert_eq!(split["relative_mean_percent"], loss["relative_mean_percent"], "{name}");
+        assert_eq!(split["under_1_percent_share"], loss["under_1_percent_share"], "{name}");
+    }
+    let ordered =
+        run(["order", "--grid", "4x4x4", "--drop", "1", "--steps", "49", "--json"]).json();
+    assert_eq!(ordered["scene"]["collisions"], formats["collisions"]);
+    assert!(number(&formats["collisions"]) > 0.0);
+}
+
 #[test]
 fn every_verb_takes_an_order_of_the_command() {
     let input = golden("pile5_step62");
@@ -206,10 +226,13 @@ fn a_refused_collision_is_named_by_its_place_in_the_folder() {
         &["solve", "--order", "gpu"],
         &["study", "determinism", "--input"],
         &["study", "half", "--input"],
+        &["study", "stopping", "--input"],
     ] {
         let ran = run([verb, &[input]].concat());
         assert_eq!(ran.code, Some(2), "{verb:?}: {}", ran.stderr);
-        assert!(ran.stderr.contains("collision 2"), "{verb:?}: {}", ran.stderr);
+        for part in ["collision 2", "contact_bodies.npy"] {
+            assert!(ran.stderr.contains(part), "{verb:?}: {}", ran.stderr);
+        }
     }
 }
 

@@ -25,6 +25,7 @@ use crate::options::solver::DeadlineArgs;
 use crate::output::SCHEMA;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
+use crate::pile;
 use crate::step_input;
 use step_folder::folder::Folder;
 
@@ -144,25 +145,13 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let progress = progress_bar(args.step);
-    for _ in 1..args.step {
-        if interrupt.is_set() {
-            progress.finish_and_clear();
-            return Ok(None);
-        }
-        scene.detect();
-        let (bodies, collisions) = scene.parts_mut();
-        match opened.accelerator.step(bodies, collisions, &parameters) {
-            Ok(_) => progress.inc(1),
-            Err(error) if board::is_cancelled(&error) => {
-                progress.finish_and_clear();
-                return Ok(None);
-            }
-            Err(error) => return Err(opened.failure(error)),
-        }
-    }
+    let before = args.step.saturating_sub(1);
+    let taken = pile::approach(&mut scene, &mut opened, &parameters, before, || {
+        progress.inc(1);
+        !interrupt.is_set()
+    });
     progress.finish_and_clear();
-    scene.detect();
-    Ok(Some(Step {
+    Ok(taken?.then(|| Step {
         bodies: scene.bodies().to_vec(),
         shapes: scene.shapes().to_vec(),
         collisions: scene.collisions().to_vec(),

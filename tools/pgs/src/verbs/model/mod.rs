@@ -193,7 +193,7 @@ impl ModelArgs {
 #[cfg(feature = "report")]
 pub(crate) fn thesis_tables() -> Vec<Table> {
     let scene = Scene {
-        step: StepShape::new(thesis::BODIES, thesis::COLLISIONS),
+        step: thesis::step(),
         variants: PROFILES.iter().map(|profile| profile.default_variant()).collect(),
         bandwidths: BANDWIDTHS.to_vec(),
     };
@@ -259,7 +259,7 @@ fn head(args: &ModelArgs, scene: &Scene) -> Vec<String> {
         grouped(step.collisions),
         step.contact_iterations,
         step.friction_iterations,
-        if scene.is_thesis_step() { ": the thesis' step" } else { "" },
+        if scene.is_thesis_step() { ": the thesis' step (iterations inferred)" } else { "" },
     )];
     if !scene.is_thesis_step() {
         lines.push(format!(

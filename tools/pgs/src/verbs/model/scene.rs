@@ -17,7 +17,7 @@ pub(super) struct Scene {
 impl Scene {
     /// Whether the step is the thesis', so that its figures can be compared with ours.
     pub(super) fn is_thesis_step(&self) -> bool {
-        self.step == StepShape::new(thesis::BODIES, thesis::COLLISIONS)
+        self.step == thesis::step()
     }
 
     /// The deviation of our figure from the thesis', percent.

@@ -3,17 +3,16 @@
 
 use std::path::Path;
 
-use scene::{Scene, SceneOptions, Spheres};
+use scene::Spheres;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::OrderArgs;
-use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
-use crate::options::scenes;
 use crate::permutation;
+use crate::pile;
 use crate::step_input;
 use step_folder::folder::Folder;
 
@@ -66,22 +65,17 @@ impl Source {
 
     /// Cubes, after some steps on the board.
     fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
-        scenes::check_rows(args.grid)?;
-        let options = SceneOptions { grid: args.grid, drop: args.drop, ..Default::default() };
-        let mut scene = Scene::new(&options).map_err(Failure::input)?;
-        if args.steps > 0 {
-            let mut opened = board::open(common, &Build::default())?;
-            opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
-            for _ in 0..args.steps {
-                scene.detect();
-                let (bodies, collisions) = scene.parts_mut();
-                opened
-                    .accelerator
-                    .step(bodies, collisions, &StepParameters::default())
-                    .map_err(|error| opened.failure(error))?;
-            }
-        }
-        scene.detect();
+        let scene = if args.steps == 0 {
+            let mut scene = pile::build(args.grid, args.drop)?;
+            scene.detect();
+            scene
+        } else {
+            let (mut scene, mut opened) =
+                pile::open(args.grid, args.drop, common, &Build::default())?;
+            let parameters = StepParameters::default();
+            pile::approach(&mut scene, &mut opened, &parameters, args.steps, || true)?;
+            scene
+        };
         let name =
             format!("{} cubes dropped from {} m, step {}", args.grid, args.drop, args.steps + 1);
         Ok(Self::new(name, scene.bodies(), scene.collisions(), scene.shapes(), None))

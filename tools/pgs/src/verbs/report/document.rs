@@ -2,6 +2,8 @@
 
 use serde_json::{Value, json};
 
+use super::place::place;
+
 /// The origin of a figure or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Origin {
@@ -11,10 +13,12 @@ pub(super) enum Origin {
     Measured,
     /// Printed in the thesis.
     Recorded,
+    /// Unknown.
+    Open,
 }
 
 impl Origin {
-    pub(super) const ALL: [Self; 3] = [Self::Recorded, Self::Modelled, Self::Measured];
+    pub(super) const ALL: [Self; 4] = [Self::Recorded, Self::Modelled, Self::Measured, Self::Open];
 
     /// The word for it.
     pub(super) const fn word(self) -> &'static str {
@@ -22,6 +26,7 @@ impl Origin {
             Self::Modelled => "modelled",
             Self::Measured => "measured",
             Self::Recorded => "recorded",
+            Self::Open => "open",
         }
     }
 
@@ -31,6 +36,7 @@ impl Origin {
             Self::Modelled => "◆",
             Self::Measured => "●",
             Self::Recorded => "▣",
+            Self::Open => "○",
         }
     }
 
@@ -42,6 +48,7 @@ impl Origin {
                 "measured on this machine: steps of the emulated board, or the host's time"
             }
             Self::Recorded => "a figure that the thesis prints",
+            Self::Open => "not known: no figure of ours",
         }
     }
 }
@@ -51,7 +58,7 @@ impl Origin {
 pub(super) struct Figure {
     /// Its anchor, and the name of its file.
     pub(super) id: &'static str,
-    /// Its place in the thesis: "Figure 4.13".
+    /// Its place in the thesis, section first: "§4.7, Figure 4.13".
     pub(super) thesis: &'static str,
     pub(super) title: String,
     /// SVG text.
@@ -65,7 +72,7 @@ pub(super) struct Figure {
 /// A row of the index: a statement of the thesis beside ours.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    /// Section, figure or table of the thesis.
+    /// Section of the thesis, and its figure or table.
     pub(super) thesis: String,
     /// The subject of both figures.
     pub(super) subject: String,
@@ -92,6 +99,12 @@ impl Part {
     pub(super) fn append(&mut self, mut other: Self) {
         self.figures.append(&mut other.figures);
         self.rows.append(&mut other.rows);
+    }
+
+    /// Sorts by the sections of the thesis; within one, figures and rows keep their order.
+    pub(super) fn sort(&mut self) {
+        self.figures.sort_by_key(|figure| place(figure.thesis));
+        self.rows.sort_by_key(|row| place(&row.thesis));
     }
 }
 

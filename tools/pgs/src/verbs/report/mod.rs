@@ -14,6 +14,8 @@ mod page;
 #[cfg(feature = "report")]
 mod parts;
 #[cfg(feature = "report")]
+mod place;
+#[cfg(feature = "report")]
 mod step;
 #[cfg(feature = "report")]
 mod studies;
@@ -84,6 +86,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    write::check(&args.out)?;
     let interrupt = Interrupt::install();
     let report = match parts::gather(args, common, &interrupt) {
         Err(_) if interrupt.is_set() => {
@@ -115,4 +118,48 @@ pub(crate) fn run(
     Err(Failure::input("this pgs was built without the report's charts").next(
         "build it with them: cargo run --release -p pgs --features report -- report --out DIR",
     ))
+}
+
+#[cfg(all(test, feature = "report"))]
+mod tests {
+    use super::*;
+    use crate::cli;
+    use crate::verbs::Verb;
+
+    /// Reports a board that `gather` refuses at once: an earlier refusal came before it.
+    fn failure(out: &std::path::Path, options: &str) -> Failure {
+        let out = out.to_str().expect("text");
+        let words = ["pgs", "report", "--out", out].into_iter().chain(options.split_whitespace());
+        let command = cli::parse(words, |_| None).expect("words");
+        let Verb::Report(args) = &command.verb else { panic!("{command:?}") };
+        run(args, &command.common, &mut Vec::new()).expect_err("a refusal")
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_is_refused_before_anything_is_measured() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        std::fs::write(&file, "no folder").expect("written");
+        let taken = folder.path().join("taken");
+        std::fs::create_dir_all(taken.join("report.html")).expect("a folder with the file's name");
+        for out in [&file, &file.join("below"), &taken] {
+            let failure = failure(out, "--board uio");
+            assert!(failure.chain().contains("file") || failure.chain().contains("taken"));
+            let mut said = Vec::new();
+            let _ = failure.report(&mut said);
+            let said = String::from_utf8(said).expect("text");
+            assert!(said.contains("--out") && !said.contains("--board"), "{said}");
+        }
+        let failure = failure(&folder.path().join("new"), "--board uio");
+        assert!(failure.chain().contains("the emulated board"), "{}", failure.chain());
+    }
+
+    #[test]
+    fn a_grid_that_no_board_takes_is_refused_before_it_is_built() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for grid in ["180x1000x180", "60x60x60"] {
+            let failure = failure(folder.path(), &format!("--board emulated --grid {grid}"));
+            assert!(failure.chain().contains("bodies with the ground"), "{}", failure.chain());
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Figure, Origin, Row};
 use super::parts::Report;
 use super::tables::anchor;
-use super::text::preface;
+use super::text::{preface, without_counterpart};
 use crate::verbs::model::render::{at_right, shown};
 use crate::verbs::model::table::Table;
 
@@ -73,7 +73,11 @@ fn index(text: &mut String, rows: &[Row]) {
             escaped(&row.command)
         );
     }
-    text.push_str("</tbody>\n</table></div>\n</section>\n");
+    let _ = writeln!(
+        text,
+        "</tbody>\n</table></div>\n<p>{}</p>\n</section>",
+        escaped(&without_counterpart())
+    );
 }
 
 fn figure(text: &mut String, figure: &Figure) {

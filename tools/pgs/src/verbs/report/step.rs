@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use scene::{Scene, SceneOptions};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::ReportArgs;
 use super::studies::{Effort, quoted};
-use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::Failure;
 use crate::options::scenes::DROP;
+use crate::pile;
 use crate::step_input;
 use step_folder::folder::Folder;
 use zynq_pgs::emulation::Build;
@@ -50,22 +49,15 @@ impl Step {
         common: &CommonArgs,
         effort: &Effort<'_>,
     ) -> Result<Self, Failure> {
-        let options = SceneOptions { grid: args.pile(), drop: DROP, ..SceneOptions::default() };
-        let mut scene = Scene::new(&options).map_err(Failure::input)?;
-        let mut opened = board::open(common, &Build::default())?;
-        opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
-        let parameters = StepParameters::default();
-        for _ in 1..args.step {
-            scene.detect();
-            let (bodies, collisions) = scene.parts_mut();
-            let stepped = opened.accelerator.step(bodies, collisions, &parameters);
-            stepped.map_err(|error| opened.failure(error))?;
-            effort.go_on()?;
-        }
-        scene.detect();
+        let grid = args.pile();
+        let (mut scene, mut opened) = pile::open(grid, DROP, common, &Build::default())?;
+        let (parameters, before) = (StepParameters::default(), args.step.saturating_sub(1));
+        let go_on = || effort.go_on().is_ok();
+        pile::approach(&mut scene, &mut opened, &parameters, before, go_on)?;
+        effort.go_on()?;
         Ok(Self {
-            name: format!("step {} of our pile of {} cubes", args.step, args.pile()),
-            options: Options::Pile { grid: args.pile().to_string(), steps: args.step },
+            name: format!("step {} of our pile of {grid} cubes", args.step),
+            options: Options::Pile { grid: grid.to_string(), steps: args.step },
             bodies: scene.bodies().to_vec(),
             shapes: scene.shapes().to_vec(),
             collisions: scene.collisions().to_vec(),

@@ -1,7 +1,14 @@
 //! Rows of the index that lead to the tables of `pgs model`.
 
+use bitstream_model::estimate::thesis::recorded::{
+    CPU, DESIGNS, DEVICE_MEGABYTES, Design, GPU, Platform,
+};
+use bitstream_model::estimate::{BLOCK_BITS, BLOCKS};
+use bitstream_model::interface::profile::FLOAT;
+
 use super::document::{Origin, Row};
 use crate::failure::{Cause, Failure};
+use crate::numbers::grouped;
 use crate::verbs::model::render::shown;
 use crate::verbs::model::table::{Cell, Table};
 
@@ -9,49 +16,72 @@ use crate::verbs::model::table::{Cell, Table};
 struct Source {
     /// Id of the table.
     table: &'static str,
-    /// Section and table of the thesis; a column may add to it.
-    thesis: &'static str,
     section: &'static str,
-    /// Keys of the columns that name a row.
+    /// The place in the thesis.
+    thesis: Place,
+    /// Keys of the columns that name a row; without one all rows of the table are one of the index:
+    /// before and after each reduction.
     names: &'static [&'static str],
-    /// Key of the column with the thesis' figure.
+    figures: &'static [Figure],
+}
+
+/// Where the thesis has the figures of a row.
+enum Place {
+    /// All rows.
+    Fixed(&'static str),
+    /// By the design of the row's profile.
+    OfDesign(fn(&Design) -> String),
+    /// By the design, in the table that the row names.
+    Named,
+}
+
+/// Columns with a figure of the thesis and ours.
+struct Figure {
     recorded: &'static str,
-    /// Key of the column with ours.
-    ours: &'static str,
+    /// Ours, or where this column is empty the one behind it.
+    ours: &'static [&'static str],
     unit: &'static str,
 }
 
-/// A table of words, whose rows are one row of the index: before and after each reduction.
-const fn words(table: &'static str, thesis: &'static str) -> Source {
-    let (recorded, ours) = ("thesis_words", "words");
-    Source { table, thesis, section: "data", names: &[], recorded, ours, unit: " words" }
+const fn figure(
+    recorded: &'static str,
+    ours: &'static [&'static str],
+    unit: &'static str,
+) -> Figure {
+    Figure { recorded, ours, unit }
+}
+
+/// A table of words, bytes and stream accesses.
+const fn data(table: &'static str, thesis: &'static str) -> Source {
+    const FIGURES: [Figure; 3] = [
+        figure("thesis_words", &["words"], " words"),
+        figure("thesis_mib", &["mib"], " MiB"),
+        figure("thesis_beats", &["beats"], " beats"),
+    ];
+    Source { table, section: "data", thesis: Place::Fixed(thesis), names: &[], figures: &FIGURES }
 }
 
 /// Data and memory.
 const CHAPTER_4: [Source; 8] = [
-    words("T4.1", "§4.4.1, Table 4.1"),
-    words("T4.2", "§4.4.1, Table 4.2"),
-    words("T4.3", "§4.4.1, Table 4.3"),
-    words("T4.4", "§4.4.1, Table 4.4"),
-    words("T4.5", "§4.4.1, Table 4.5"),
-    words("T4.6", "§4.4.1, Table 4.6"),
+    data("T4.1", "§4.4.1, Table 4.1"),
+    data("T4.2", "§4.4.1, Table 4.2"),
+    data("T4.3", "§4.4.1, Table 4.3"),
+    data("T4.4", "§4.4.1, Table 4.4"),
+    data("T4.5", "§4.4.1, Table 4.5"),
+    data("T4.6", "§4.4.1, Table 4.6"),
     Source {
         table: "memory",
-        thesis: "§4.4.2",
         section: "memory",
+        thesis: Place::Fixed("§4.4.2"),
         names: &["profile"],
-        recorded: "thesis_mib",
-        ours: "mib",
-        unit: " MiB",
+        figures: &[figure("thesis_mib", &["mib"], " MiB")],
     },
     Source {
         table: "memory",
-        thesis: "§4.4.2, with positions",
         section: "memory",
+        thesis: Place::Fixed("§4.4.2, with positions"),
         names: &["profile"],
-        recorded: "thesis_with_positions_mib",
-        ours: "with_positions_mib",
-        unit: " MiB",
+        figures: &[figure("thesis_with_positions_mib", &["with_positions_mib"], " MiB")],
     },
 ];
 
@@ -59,54 +89,61 @@ const CHAPTER_4: [Source; 8] = [
 const CHAPTER_6: [Source; 5] = [
     Source {
         table: "cycles",
-        thesis: "§6.4, §6.5, Tables 6.4 and 6.8: cycles",
         section: "step",
+        thesis: Place::OfDesign(|design| of_design(design, design.results, ": cycles")),
         names: &["profile", "records"],
-        recorded: "thesis",
-        ours: "total",
-        unit: "",
+        figures: &[figure("thesis", &["total"], "")],
     },
     Source {
         table: "blocks",
-        thesis: "§6.4, §6.5, Tables 6.4 and 6.8: BRAM_18K",
         section: "memory",
+        thesis: Place::OfDesign(|design| of_design(design, design.results, ": BRAM_18K")),
         names: &["profile"],
-        recorded: "thesis_percent",
-        ours: "ideal_percent",
-        unit: "",
+        figures: &[figure("thesis_percent", &["ideal_percent"], "")],
     },
     Source {
         table: "time",
-        thesis: "§6.4, §6.5, Tables 6.5 and 6.9: ms",
         section: "step",
+        thesis: Place::OfDesign(|design| of_design(design, design.comparison, ": ms")),
         names: &["profile", "records", "bandwidth"],
-        recorded: "thesis_ms",
-        ours: "ms",
-        unit: "",
-    },
-    Source {
-        table: "comparison",
-        thesis: "§6.4, §6.5",
-        section: "comparison",
-        names: &["table", "profile", "figure"],
-        recorded: "thesis",
-        ours: "packed_unlimited",
-        unit: "",
+        figures: &[figure("thesis_ms", &["ms"], "")],
     },
     Source {
         table: "platforms",
-        thesis: "§6.1, Tables 6.5 and 6.9: energy of GPU and CPU, J",
         section: "comparison",
+        thesis: Place::Fixed("§6.4, §6.5, Tables 6.5 and 6.9: energy of GPU and CPU, J"),
         names: &["platform"],
-        recorded: "joules",
-        ours: "recomputed_joules",
-        unit: "",
+        figures: &[figure("joules", &["recomputed_joules"], "")],
+    },
+    Source {
+        table: "comparison",
+        section: "comparison",
+        thesis: Place::Named,
+        names: &["profile", "figure"],
+        // The thesis' powers give the power efficiency, without a figure of ours.
+        figures: &[figure("thesis", &["packed_unlimited", "recomputed"], "")],
     },
 ];
 
+/// The first sources of chapter 6: results of the designs alone (Tables 6.4 and 6.8).
+const RESULTS: usize = 2;
+
+/// A place of a design's figures, from the short name of a table.
+fn of_design(design: &Design, table: &str, what: &str) -> String {
+    let table = match table.strip_prefix('T') {
+        Some(number) => format!("Table {number}"),
+        None => table.replace("eq", "equation"),
+    };
+    format!("{}, {table}{what}", design.section)
+}
+
 /// Id of a table in the report.
 pub(super) fn anchor(table: &Table) -> String {
-    let text = table.id.to_lowercase().replace(['.', '_'], "-");
+    anchor_of(table.id)
+}
+
+fn anchor_of(id: &str) -> String {
+    let text = id.to_lowercase().replace(['.', '_'], "-");
     format!("table-{text}")
 }
 
@@ -115,56 +152,173 @@ pub(super) fn of_chapter_4(tables: &[Table]) -> Result<Vec<Row>, Failure> {
 }
 
 pub(super) fn of_chapter_6(tables: &[Table]) -> Result<Vec<Row>, Failure> {
-    rows(&CHAPTER_6, tables)
+    let (results, comparisons) = CHAPTER_6.split_at(RESULTS);
+    let mut all = vec![device(), powers()];
+    all.extend(rows(results, tables)?);
+    all.extend(DESIGNS.map(logic));
+    all.extend(rows(comparisons, tables)?);
+    Ok(all)
+}
+
+/// The block RAM of the device (Table 6.1).
+fn device() -> Row {
+    let mebibytes = (BLOCKS * BLOCK_BITS) as f64 / 8.0 / f64::from(1 << 20);
+    Row {
+        thesis: "§6.1.1, Table 6.1".to_owned(),
+        subject: "block RAM of the device".to_owned(),
+        recorded: format!("{DEVICE_MEGABYTES} MB"),
+        ours: format!("{} BRAM_18K: {mebibytes:.1} MiB", grouped(BLOCKS)),
+        origin: Origin::Modelled,
+        command: "pgs model --section memory".to_owned(),
+        shown: anchor_of("blocks"),
+    }
+}
+
+/// The powers of GPU and CPU (Tables 6.2 and 6.3).
+fn powers() -> Row {
+    let both = |watts: fn(&Platform) -> f64| format!("{} W and {} W", watts(&GPU), watts(&CPU));
+    Row {
+        thesis: "§6.1.2, §6.1.3, Tables 6.2 and 6.3".to_owned(),
+        subject: format!("thermal design power of {} and {}", GPU.name, CPU.name),
+        recorded: both(|platform| platform.design_watts),
+        ours: format!(
+            "not measured; Tables 6.5 and 6.9 calculate with {}",
+            both(|platform| platform.watts)
+        ),
+        origin: Origin::Open,
+        command: "pgs model --section comparison".to_owned(),
+        shown: anchor_of("platforms"),
+    }
+}
+
+/// Logic and clock of a design (Tables 6.4 and 6.8), which no synthesis has given for ours.
+fn logic(design: &Design) -> Row {
+    let name = design.profile.name;
+    let Design { dsp, flip_flops, lookup_tables, clock_mhz, .. } = design;
+    // The Verilog is of this profile.
+    let (counted, command) = match design.profile.id == FLOAT.id {
+        true => (
+            "Yosys counts the cells of its generated Verilog (the command)",
+            "tools/scripts/rtl-resources.sh",
+        ),
+        false => ("it has no Verilog", "pgs model --section memory"),
+    };
+    Row {
+        thesis: of_design(design, design.results, ": logic and clock"),
+        subject: format!("{name}: DSP48E, FF, LUT, clock"),
+        recorded: format!("{dsp} %, {flip_flops} %, {lookup_tables} %, {clock_mhz} MHz"),
+        ours: format!("not synthesised by Vivado; {counted}; the clock is taken from the thesis"),
+        origin: Origin::Open,
+        command: command.to_owned(),
+        shown: anchor_of("logic"),
+    }
 }
 
 /// A row of the index for each row of a table that has a figure of the thesis.
 fn rows(sources: &[Source], tables: &[Table]) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for source in sources {
-        let missing = |what: &str| {
-            Failure::new(Cause::Input, format!("the model has no {what} in {}", source.table))
-        };
         let table = tables.iter().find(|table| table.id == source.table);
-        let table = table.ok_or_else(|| missing("table"))?;
-        let column = |key: &str| {
-            let place = table.columns.iter().position(|column| column.key == key);
-            place.ok_or_else(|| missing(key))
-        };
-        let names = source.names.iter().map(|key| column(key)).collect::<Result<Vec<_>, _>>()?;
-        let (recorded, ours) = (column(source.recorded)?, column(source.ours)?);
-        if source.names.is_empty() {
-            let together = |column: usize| {
-                let cells: Vec<String> = table.rows.iter().map(|row| shown(&row[column])).collect();
-                cells.join(" → ") + source.unit
-            };
-            let subject = table.title.split(':').next().unwrap_or_default();
-            let subject = subject.trim_start_matches(table.id).trim().to_owned();
-            rows.push(row(source, table, subject, together(recorded), together(ours)));
-            continue;
-        }
-        for cells in &table.rows {
-            // Powers of the thesis alone have no figure of ours to stand beside it.
-            if [recorded, ours].iter().any(|column| cells[*column] == Cell::Missing) {
-                continue;
-            }
-            let subject: Vec<String> = names.iter().map(|column| shown(&cells[*column])).collect();
-            let figure = |column: usize| shown(&cells[column]) + source.unit;
-            rows.push(row(source, table, subject.join(", "), figure(recorded), figure(ours)));
+        let table = table.ok_or_else(|| source.missing("table"))?;
+        match source.names {
+            [] => rows.push(source.together(table)?),
+            names => rows.extend(source.each(table, names)?),
         }
     }
     Ok(rows)
 }
 
-fn row(source: &Source, table: &Table, subject: String, recorded: String, ours: String) -> Row {
-    Row {
-        thesis: source.thesis.to_owned(),
-        subject,
-        recorded,
-        ours,
-        origin: Origin::Modelled,
-        command: format!("pgs model --section {}", source.section),
-        shown: anchor(table),
+impl Source {
+    fn missing(&self, what: &str) -> Failure {
+        Failure::new(Cause::Input, format!("the model has no {what} in {}", self.table))
+    }
+
+    fn column(&self, table: &Table, key: &str) -> Result<usize, Failure> {
+        let place = table.columns.iter().position(|column| column.key == key);
+        place.ok_or_else(|| self.missing(key))
+    }
+
+    /// The first of these cells of a row that is known.
+    fn known(&self, table: &Table, row: &[Cell], keys: &[&str]) -> Result<Option<String>, Failure> {
+        for key in keys {
+            let cell = &row[self.column(table, key)?];
+            if *cell != Cell::Missing {
+                return Ok(Some(shown(cell)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// All rows of a table in one of the index.
+    fn together(&self, table: &Table) -> Result<Row, Failure> {
+        let all = |keys_of: fn(&Figure) -> &[&'static str]| -> Result<String, Failure> {
+            let mut figures = Vec::new();
+            for figure in self.figures {
+                let mut cells = Vec::new();
+                for row in &table.rows {
+                    cells.extend(self.known(table, row, keys_of(figure))?);
+                }
+                figures.push(cells.join(" → ") + figure.unit);
+            }
+            Ok(figures.join(", "))
+        };
+        let subject = table.title.split(':').next().unwrap_or_default();
+        let subject = subject.trim_start_matches(table.id).trim().to_owned();
+        let recorded = all(|figure| std::slice::from_ref(&figure.recorded))?;
+        let ours = all(|figure| figure.ours)?;
+        Ok(self.row(table, None, subject, recorded, ours))
+    }
+
+    /// A row of the index for each row that has both figures.
+    fn each(&self, table: &Table, names: &[&str]) -> Result<Vec<Row>, Failure> {
+        let mut rows = Vec::new();
+        for cells in &table.rows {
+            for figure in self.figures {
+                let recorded = self.known(table, cells, &[figure.recorded])?;
+                let ours = self.known(table, cells, figure.ours)?;
+                // Powers of the thesis alone have no figure of ours to stand beside it.
+                let Some((recorded, ours)) = recorded.zip(ours) else { continue };
+                let subject = names
+                    .iter()
+                    .map(|name| Ok(shown(&cells[self.column(table, name)?])))
+                    .collect::<Result<Vec<_>, Failure>>()?;
+                let [recorded, ours] = [recorded, ours].map(|text| text + figure.unit);
+                rows.push(self.row(table, Some(cells), subject.join(", "), recorded, ours));
+            }
+        }
+        Ok(rows)
+    }
+
+    fn row(
+        &self,
+        table: &Table,
+        cells: Option<&[Cell]>,
+        subject: String,
+        recorded: String,
+        ours: String,
+    ) -> Row {
+        let cell = |key: &str| {
+            let place = table.columns.iter().position(|column| column.key == key)?;
+            cells.map(|cells| shown(&cells[place]))
+        };
+        let design = || {
+            let name = cell("profile")?;
+            DESIGNS.into_iter().find(|design| design.profile.name == name)
+        };
+        let thesis = match self.thesis {
+            Place::Fixed(thesis) => Some(thesis.to_owned()),
+            Place::OfDesign(place) => design().map(place),
+            Place::Named => design().zip(cell("table")).map(|(d, table)| of_design(d, &table, "")),
+        };
+        Row {
+            thesis: thesis.unwrap_or_else(|| "Chapter 6".to_owned()),
+            subject,
+            recorded,
+            ours,
+            origin: Origin::Modelled,
+            command: format!("pgs model --section {}", self.section),
+            shown: anchor(table),
+        }
     }
 }
 
@@ -173,20 +327,55 @@ mod tests {
     use super::*;
     use crate::verbs::model::thesis_tables;
 
-    #[test]
-    fn every_table_of_the_thesis_has_rows_with_both_figures() {
+    fn all() -> Vec<Row> {
         let tables = thesis_tables();
         let mut rows = of_chapter_4(&tables).expect("every source has its table");
         rows.extend(of_chapter_6(&tables).expect("every source has its table"));
-        for source in CHAPTER_4.iter().chain(&CHAPTER_6) {
-            let own = rows.iter().filter(|row| row.thesis == source.thesis);
-            assert!(own.count() > 0, "{}", source.thesis);
+        rows
+    }
+
+    fn of<'a>(rows: &'a [Row], thesis: &str, subject: &str) -> &'a Row {
+        let found = rows.iter().find(|row| row.thesis == thesis && row.subject.contains(subject));
+        found.unwrap_or_else(|| panic!("{thesis}, {subject}: {rows:#?}"))
+    }
+
+    #[test]
+    fn every_table_of_the_thesis_has_rows_with_both_figures() {
+        let rows = all();
+        for chapter in [4, 6] {
+            for table in 1..=if chapter == 4 { 6 } else { 11 } {
+                let number = format!("{chapter}.{table}");
+                let has = |row: &&Row| {
+                    let end =
+                        |text: &str| !text.starts_with(|letter: char| letter.is_ascii_digit());
+                    row.thesis
+                        .match_indices(&number)
+                        .any(|(at, _)| end(&row.thesis[at + number.len()..]))
+                        && row.thesis.contains("Table")
+                };
+                let own: Vec<_> = rows.iter().filter(has).collect();
+                assert!(!own.is_empty(), "Table {number}");
+            }
         }
-        let cycles = rows.iter().find(|row| row.recorded == "2,062,697").expect("Table 6.4");
-        assert_eq!(cycles.subject, "float, packed");
-        assert_eq!(cycles.ours, "2,066,606");
-        let words = rows.iter().find(|row| row.thesis.ends_with("4.1")).expect("Table 4.1");
-        assert_eq!(words.ours, "7,423,040 → 3,662,280 words");
-        assert_eq!(words.subject, "PGS input");
+        let cycles = of(&rows, "§6.4, Table 6.4: cycles", "float, packed");
+        assert_eq!((&*cycles.recorded, &*cycles.ours), ("2,062,697", "2,066,606"));
+        let words = of(&rows, "§4.4.1, Table 4.1", "PGS input");
+        let first = "7,423,040 → 3,662,280 words, 28.32 → 13.97 MiB, 1,855,760 → 915,570 beats";
+        assert_eq!((&*words.subject, &*words.recorded), ("PGS input", first));
+        assert_eq!(words.ours, first);
+    }
+
+    #[test]
+    fn rows_without_a_time_of_ours_have_the_figure_that_the_thesis_powers_give() {
+        let rows = all();
+        for table in ["§6.4, Table 6.7", "§6.5, Table 6.11"] {
+            let gpu = of(&rows, table, "power efficiency over GTX 980");
+            assert_eq!((&*gpu.recorded, &*gpu.ours), ("19.20", "19.20"));
+            let cpu = of(&rows, table, "power efficiency over i7-3770");
+            assert_eq!((&*cpu.recorded, &*cpu.ours), ("8.67", "8.87"));
+        }
+        let logic = of(&rows, "§6.5, Table 6.8: logic and clock", "half");
+        assert_eq!((&*logic.recorded, logic.origin), ("42 %, 29 %, 49 %, 250 MHz", Origin::Open));
+        assert_eq!(of(&rows, "§6.1.1, Table 6.1", "block RAM").ours, "1,824 BRAM_18K: 4.0 MiB");
     }
 }

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::document::{Figure, Origin, Row};
 use super::parts::Report;
+use super::place::WITHOUT_COUNTERPART;
 use super::tables::anchor;
 use crate::failure::Failure;
 use crate::output::SCHEMA;
@@ -28,6 +29,12 @@ pub(super) fn preface(report: &Report) -> String {
     format!("{step}{effort}")
 }
 
+/// The figures of the thesis that the index lacks.
+pub(super) fn without_counterpart() -> String {
+    let each = WITHOUT_COUNTERPART.map(|(thesis, reason)| format!("{thesis} ({reason})"));
+    format!("Without a counterpart: {}.", each.join("; "))
+}
+
 pub(super) fn json(report: &Report) -> Value {
     json!({
         "schema": SCHEMA,
@@ -35,6 +42,10 @@ pub(super) fn json(report: &Report) -> Value {
         "step": report.step,
         "of_folder": report.given,
         "quick": report.quick,
+        "without_counterpart": WITHOUT_COUNTERPART
+            .iter()
+            .map(|(thesis, reason)| json!({ "thesis": thesis, "reason": reason }))
+            .collect::<Vec<_>>(),
         "index": report.part.rows.iter().map(Row::to_json).collect::<Vec<_>>(),
         "figures": report.part.figures.iter().map(Figure::to_json).collect::<Vec<_>>(),
         "tables": report.tables.iter().map(Table::to_json).collect::<Vec<_>>(),
@@ -63,6 +74,7 @@ pub(super) fn markdown(report: &Report) -> Result<String, Failure> {
             row.command
         );
     }
+    let _ = writeln!(text, "\n{}", without_counterpart());
     text.push_str("\n## Figures\n\n");
     for figure in &report.part.figures {
         let _ = writeln!(

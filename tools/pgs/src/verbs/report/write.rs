@@ -10,27 +10,41 @@ use super::parts::Report;
 use super::{page, text};
 use crate::failure::{Cause, Failure};
 
-/// Writes the report into a folder, which it makes; the paths of the files.
-pub(super) fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Failure> {
-    let figures = folder.join("figures");
+/// The files beside the figures.
+const FILES: [&str; 3] = ["report.html", "report.md", "report.json"];
+/// The folder of the figures.
+const FIGURES: &str = "figures";
+
+/// Makes the folder of the report, and sees that files can be written into it.
+pub(super) fn check(folder: &Path) -> Result<(), Failure> {
+    let figures = folder.join(FIGURES);
     fs::create_dir_all(&figures).map_err(|error| {
         let message = format!("{} cannot be made: {error}", figures.display());
         Failure::new(Cause::Output, message).next("name another folder with --out")
     })?;
-    let mut files = vec![
-        (folder.join("report.html"), page::html(report)),
-        (folder.join("report.md"), text::markdown(report)?),
-        (folder.join("report.json"), format!("{:#}\n", text::json(report))),
-    ];
+    // Without a commit the replacements leave earlier files as they are.
+    let mut probe = Replacement::default();
+    for path in FILES.map(|file| folder.join(file)).into_iter().chain([figures.join("probe.svg")]) {
+        probe.stage(&path, |_| Ok(())).map_err(unwritten)?;
+    }
+    Ok(())
+}
+
+fn unwritten(error: ReplaceError) -> Failure {
+    Failure::new(Cause::Output, error).next("make room, or name another folder with --out")
+}
+
+/// Writes the report into a folder that [`check`] has made; the paths of the files.
+pub(super) fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Failure> {
+    let texts =
+        [page::html(report), text::markdown(report)?, format!("{:#}\n", text::json(report))];
+    let mut files: Vec<_> = FILES.map(|file| folder.join(file)).into_iter().zip(texts).collect();
     let pictures = report.part.figures.iter();
     files.extend(pictures.map(|figure| (folder.join(figure.file()), figure.svg.clone())));
-    let failed = |error: ReplaceError| {
-        Failure::new(Cause::Output, error).next("make room, or name another folder with --out")
-    };
     let mut replacement = Replacement::default();
     for (path, text) in &files {
-        replacement.stage(path, |file| file.write_all(text.as_bytes())).map_err(failed)?;
+        replacement.stage(path, |file| file.write_all(text.as_bytes())).map_err(unwritten)?;
     }
-    replacement.commit().map_err(failed)?;
+    replacement.commit().map_err(unwritten)?;
     Ok(files.into_iter().map(|(path, _)| path).collect())
 }

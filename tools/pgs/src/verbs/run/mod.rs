@@ -43,7 +43,7 @@ use step_folder::digest;
 const EXAMPLES: &str = "\
 Examples:
   pgs run                                        the thesis' 38,880 cubes
-  pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes
+  pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes (inferred)
   pgs run --grid 10x10x10 --steps 600 --report-every 30
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
@@ -63,8 +63,8 @@ Examples:
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
-thesis names no height. So are 10 + 10 iterations: with the thesis' 4 + 4 a pile of 30 layers sinks
-0.2 m into itself and bounces.
+thesis names no height. So are 10 + 10 iterations: with 4 + 4, the thesis' number by its cycles, a
+pile of 30 layers sinks 0.2 m into itself and bounces.
 
 Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
@@ -74,9 +74,9 @@ and the energy of the same scene without a warm start and with one friction, ste
 /// Default rows of the table.
 const ROWS: u32 = 15;
 /// Default steps of the cubes, and of the shapes.
-const STEPS: [u32; 2] = [120, 600];
+pub(crate) const STEPS: [u32; 2] = [120, 600];
 /// Default contact and friction iterations of a step: enough to carry 30 layers.
-const ITERATIONS: u32 = 10;
+pub(crate) const ITERATIONS: u32 = 10;
 
 /// Step a pile dropped on the ground.
 #[derive(Debug, Clone, Args)]

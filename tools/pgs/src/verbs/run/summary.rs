@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use bitstream_model::estimate::thesis::{self, recorded};
-use bitstream_model::estimate::{Records, StepCycles, StepShape};
+use bitstream_model::estimate::{Records, StepCycles};
 use scene::{Scene, moving_mass, penetration};
 use serde_json::{Value, json};
 use zynq_pgs::interface::profile::Profile;
@@ -109,17 +109,14 @@ struct Thesis {
     same_passes_ms: f64,
 }
 
-/// Passes of the thesis' step.
-const THESIS_PASSES: u32 = 8;
-
 impl Thesis {
     fn for_run(profile: &Profile, passes: u32) -> Self {
         let half = recorded::HALF_DESIGN.profile.name == profile.name;
         let design = if half { &recorded::HALF_DESIGN } else { &recorded::FLOAT_DESIGN };
-        let shape = StepShape::new(thesis::BODIES, thesis::COLLISIONS);
+        let shape = thesis::step();
         let variant = design.profile.default_variant();
         let pass = StepCycles::new(&variant, Records::Packed, &shape).pass;
-        let more = f64::from(passes) - f64::from(THESIS_PASSES);
+        let more = f64::from(passes) - shape.passes() as f64;
         let more_ms = more * pass as f64 / f64::from(design.profile.clock_khz);
         Self { design, pass, same_passes_ms: design.latency_ms + more_ms }
     }
@@ -127,18 +124,21 @@ impl Thesis {
     fn text(self, passes: u32) -> String {
         let Self { design, pass, same_passes_ms } = self;
         let recorded::Design { latency_ms, profile, comparison, .. } = design;
-        let collisions = grouped(thesis::COLLISIONS);
         let (gpu, cpu) = (recorded::GPU, recorded::CPU);
-        let scaled = match passes {
-            THESIS_PASSES => String::new(),
-            _ => format!(
-                "; {passes} passes are {same_passes_ms:.2} ms by its {} cycles a pass",
-                grouped(pass)
-            ),
+        let step = thesis::step();
+        let (collisions, own) = (grouped(step.collisions), step.passes());
+        let scaled = if u64::from(passes) == own {
+            String::new()
+        } else {
+            let pass = grouped(pass);
+            format!(
+                "; {passes} passes are {same_passes_ms:.2} ms by {pass} cycles a pass (modelled)"
+            )
         };
         format!(
-            "recorded for {collisions} collisions and {THESIS_PASSES} passes ({comparison}): its \
-             {} design {latency_ms} ms, {} {} ms, {} {} ms{scaled}",
+            "recorded ({comparison}): its {} design {latency_ms} ms, {} {} ms, {} {} ms, for \
+             {collisions} collisions (§4.4.1) and a number of passes that it does not print: {own} by \
+             its cycles (inferred){scaled}",
             profile.name, gpu.name, gpu.latency_ms, cpu.name, cpu.latency_ms
         )
     }
@@ -324,7 +324,7 @@ impl<'a> Summary<'a> {
             "thesis": self.thesis().map(|thesis| json!({
                 "design": thesis.design.profile.name,
                 "recorded_ms": thesis.design.latency_ms,
-                "recorded_passes": THESIS_PASSES,
+                "inferred_passes": thesis::step().passes(),
                 "recorded_collisions": thesis::COLLISIONS,
                 "same_passes_ms": thesis.same_passes_ms,
                 "gpu_ms": recorded::GPU.latency_ms,

@@ -37,6 +37,9 @@ Examples:
 
 `pgs study NAME --help` tells how each one measures.";
 
+/// The last line of an outcome that Ctrl-C has cut short.
+const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
+
 /// Measure again the claims of the thesis: time steps, stopping rules, orders, number formats, the
 /// shares of a step, and the ladder of designs.
 #[derive(Debug, Clone, Args)]
@@ -63,10 +66,15 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    let session = Session::new(common);
-    let complete = match &args.study {
+    within(&args.study, &Session::new(common), out)
+}
+
+/// Measures and shows the outcome, as the session's Ctrl-C leaves it.
+fn within(study: &Study, session: &Session, out: &mut dyn Write) -> Result<Verdict, Failure> {
+    let common = &session.common;
+    let complete = match study {
         Study::TimeStep(options) => {
-            let outcome = time_step::measure(options, &session)?;
+            let outcome = time_step::measure(options, session)?;
             match common.json {
                 true => write(out, "time-step", &outcome)?,
                 false => time_step::show(&outcome, out)?,
@@ -74,7 +82,7 @@ pub(crate) fn run(
             outcome.complete
         }
         Study::Stopping(options) => {
-            let outcome = stopping::measure(options, &session)?;
+            let outcome = stopping::measure(options, session)?;
             match common.json {
                 true => write(out, "stopping", &outcome)?,
                 false => stopping::show(&outcome, out)?,
@@ -82,7 +90,7 @@ pub(crate) fn run(
             outcome.complete
         }
         Study::Split(options) => {
-            let outcome = split::measure(options, &session)?;
+            let outcome = split::measure(options, session)?;
             match common.json {
                 true => write(out, "split", &outcome)?,
                 false => split::show(&outcome, out)?,
@@ -90,7 +98,7 @@ pub(crate) fn run(
             outcome.complete
         }
         Study::Determinism(options) => {
-            let outcome = determinism::measure(options, &session)?;
+            let outcome = determinism::measure(options, session)?;
             match common.json {
                 true => write(out, "determinism", &outcome)?,
                 false => determinism::show(&outcome, out)?,
@@ -98,7 +106,7 @@ pub(crate) fn run(
             outcome.complete
         }
         Study::Half(options) => {
-            let outcome = half::measure(options, &session)?;
+            let outcome = half::measure(options, session)?;
             match common.json {
                 true => write(out, "half", &outcome)?,
                 false => half::show(&outcome, out)?,
@@ -114,7 +122,14 @@ pub(crate) fn run(
             true
         }
     };
-    Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
+    if complete {
+        return Ok(Verdict::Done);
+    }
+    // The document has the member `complete`.
+    if !common.json {
+        writeln!(out, "{INTERRUPTED}")?;
+    }
+    Ok(Verdict::Interrupted)
 }
 
 /// Writes the document for programs.
@@ -124,4 +139,38 @@ fn write(out: &mut dyn Write, study: &str, outcome: &impl Serialize) -> Result<(
     document["verb"] = "study".into();
     document["study"] = Value::from(study);
     Ok(writeln!(out, "{document:#}")?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli;
+    use crate::interrupt::Interrupt;
+    use crate::verbs::Verb;
+    use indicatif::ProgressBar;
+
+    #[test]
+    fn every_study_says_once_that_ctrl_c_has_cut_it_short() {
+        for words in [
+            "time-step --grid 2x2x2",
+            "stopping --grid 2x2x2",
+            "split --grid 2x2x2",
+            "determinism --grid 2x2x2",
+            "half --grid 2x2x2 --build half",
+        ] {
+            let words = ["pgs", "study"].into_iter().chain(words.split_whitespace());
+            let command =
+                cli::parse(words.chain(["--board", "emulated"]), |_| None).expect("words");
+            let Verb::Study(args) = &command.verb else { panic!("{command:?}") };
+            let interrupt = Interrupt::install();
+            interrupt.cancellation().cancel();
+            let session = Session::within(&command.common, interrupt, ProgressBar::hidden());
+            let mut out = Vec::new();
+            let verdict = within(&args.study, &session, &mut out).expect("an outcome");
+            let text = String::from_utf8(out).expect("text");
+            assert_eq!(verdict, Verdict::Interrupted, "{text}");
+            assert_eq!(text.matches("interrupted: ").count(), 1, "{text}");
+            assert!(text.ends_with(&format!("{INTERRUPTED}\n")), "{text}");
+        }
+    }
 }

@@ -38,3 +38,36 @@ pub(crate) const HALF_AGAINST_FLOAT: RecordedDeviation = RecordedDeviation {
     mean_percent: [0.06, 0.06],
     under_1_percent_share: Some(0.9964),
 };
+
+/// The input of a step in binary16 (§4.6.2, Figures 4.7 and 4.8).
+#[cfg(feature = "report")]
+pub(crate) struct RecordedInput {
+    /// Magnitudes of the numbers, smallest and largest (§4.6.4).
+    pub(crate) magnitudes: [f64; 2],
+    /// Mean error of binary16.
+    pub(crate) mean_percent: f64,
+    /// Share of the numbers with an error below 1 %.
+    pub(crate) under_1_percent_share: f64,
+}
+
+/// The numbers that the thesis gives its design.
+#[cfg(feature = "report")]
+pub(crate) const INPUT: RecordedInput = RecordedInput {
+    magnitudes: [3.0e-5, 450.0],
+    mean_percent: 0.02,
+    under_1_percent_share: 0.9993,
+};
+
+/// Bits of exponent and mantissa of sixteen bits, in IEEE 754 and in the thesis' own form (Figures 4.4
+/// and 4.11).
+#[cfg(feature = "report")]
+pub(crate) const SIXTEEN_BITS: [u32; 2] = [5, 10];
+/// Smallest and largest magnitude of its own form (§4.6.4).
+#[cfg(feature = "report")]
+pub(crate) const SIXTEEN_BITS_RANGE: [f64; 2] = [6.10352e-5, 512.0];
+
+/// Most bodies alive in its sorted order (§4.7), and the share of all bodies that it prints.
+#[cfg(feature = "report")]
+pub(crate) const MOST_ALIVE: u32 = 1528;
+#[cfg(feature = "report")]
+pub(crate) const MOST_ALIVE_PERCENT: f64 = 3.85;

@@ -25,7 +25,7 @@ impl Session {
     }
 
     /// A session in a verb that has taken over Ctrl-C, and shows the progress in `bar`.
-    #[cfg(feature = "report")]
+    #[cfg(any(feature = "report", test))]
     pub(crate) fn within(common: &CommonArgs, interrupt: Interrupt, bar: ProgressBar) -> Self {
         Self { common: common.clone(), interrupt, bar, owns_bar: false }
     }

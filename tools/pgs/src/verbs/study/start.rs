@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::options::scenes::SceneArgs;
 use crate::options::solver::{DeadlineArgs, SolverArgs};
 use crate::permutation::{self, Permutation};
+use crate::pile;
 use crate::step_input;
 use crate::verbs::formats::{EACH_ONCE, numbers};
 use step_folder::folder::Folder;
@@ -144,25 +145,20 @@ impl<'a> Start<'a> {
             return Ok(true);
         }
         session.expect(self.args.from.into());
-        let bodies = {
-            let mut run = self.run(None)?;
-            for _ in 0..self.args.from {
-                if !run.step(opened, &self.parameters, session, self)? {
-                    return Ok(false);
-                }
-            }
-            run.bodies().to_vec()
-        };
-        self.bodies = bodies;
-        Ok(true)
+        let mut scene = self.args.scene.build(&Build::default())?;
+        let taken = pile::approach(&mut scene, opened, &self.parameters, self.args.from, || {
+            session.advance();
+            !session.is_interrupted()
+        })?;
+        if taken {
+            self.bodies = scene.bodies().to_vec();
+        }
+        Ok(taken)
     }
 
     /// Makes a failure of the driver's error; for a folder, with the array at fault.
     pub(super) fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
-        match &self.folder {
-            Some(folder) if error.is_input() => Failure::input(step_input::locate(error, folder)),
-            _ => opened.failure(error),
-        }
+        step_input::failure(self.folder.as_ref(), opened, error)
     }
 
     /// The start for people.

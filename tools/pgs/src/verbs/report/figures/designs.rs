@@ -1,9 +1,9 @@
 //! Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
 
 use bitstream_model::Bandwidth;
+use bitstream_model::estimate::thesis;
 use bitstream_model::estimate::thesis::recorded::{CPU, Design, GPU, Platform};
-use bitstream_model::estimate::thesis::{BODIES, COLLISIONS};
-use bitstream_model::estimate::{Records, StepShape, StepTime};
+use bitstream_model::estimate::{Records, StepTime};
 use bitstream_model::interface::profile::PROFILES;
 
 use super::super::chart::bars;
@@ -20,7 +20,7 @@ fn beside(
     recorded: impl Fn(&Design) -> f64,
     ours: fn(&Outcome, &Platform) -> f64,
 ) -> Vec<(String, Beside)> {
-    let shape = StepShape::new(BODIES, COLLISIONS);
+    let shape = thesis::step();
     PROFILES
         .iter()
         .map(|profile| {
@@ -69,7 +69,7 @@ fn row(figure: &Figure, over: &[Vec<(String, Beside)>; 2], what: &str) -> Row {
     let ours =
         designs().map(|((name, gpu), (_, cpu))| format!("{name} {:.2} and {:.2}", gpu.1, cpu.1));
     Row {
-        thesis: format!("§6.4, §6.5, {}", figure.thesis),
+        thesis: figure.thesis.to_owned(),
         subject: format!("{what} over GPU and CPU"),
         recorded: recorded.collect::<Vec<_>>().join(", "),
         ours: ours.collect::<Vec<_>>().join(", "),
@@ -91,16 +91,18 @@ pub(crate) fn part() -> Result<Part, Failure> {
     let figures = vec![
         figure(
             "figure-6-1",
-            "Figure 6.1",
+            "§6.5, Figure 6.1",
             "Speed-up of each design over GPU and CPU",
             [&speed[0], &speed[1]],
             "Times of GTX 980 and i7-3770 are the thesis' records; the accelerator's are our model's, on \
-             the thesis' step. The thesis prints no figures of its first design (naive); mixed, windowed \
-             and windowed16 are this project's own.",
+             the thesis' step. The thesis' figure has bars of its first design, and its text prints no numbers \
+             of it. Our naive converts contacts within the passes, the thesis in a kernel of its own whose \
+             rows go through memory: ours is a lower bound of its first design. mixed, windowed and \
+             windowed16 are this project's own.",
         )?,
         figure(
             "figure-6-2",
-            "Figure 6.2",
+            "§6.5, Figure 6.2",
             "Energy efficiency of each design over GPU and CPU",
             [&energy[0], &energy[1]],
             "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured.",

@@ -35,7 +35,7 @@ pub(crate) fn part() -> Result<Part, Failure> {
     ];
     let figure = Figure {
         id: "figure-2-6",
-        thesis: "Figure 2.6",
+        thesis: "§2.1.3, Figure 2.6",
         title: "Position of a falling body with different time steps".to_owned(),
         svg: lines(Axis::linear("time, s"), Axis::linear("position, m"), &series)?,
         caption: "The acceleration is 10 m/s². The explicit rule moves a body by the speed at the \
@@ -47,7 +47,7 @@ pub(crate) fn part() -> Result<Part, Failure> {
         playback: None,
     };
     let row = Row {
-        thesis: "§2.1.3, Figure 2.6".to_owned(),
+        thesis: figure.thesis.to_owned(),
         subject: "position after 10 s: dt = 1 s, dt = 1/100 s, exact".to_owned(),
         recorded: "450 m, 499.49 m, 500 m".to_owned(),
         ours: format!("{:.0} m, {:.2} m, {:.0} m", ends.0, ends.1, ends.2),

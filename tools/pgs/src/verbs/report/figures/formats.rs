@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::narrow::NarrowFormat;
 use crate::numbers::grouped;
 use crate::verbs::formats::{EACH_ONCE, Loss, Sizes, numbers};
+use crate::verbs::study::recorded::INPUT;
 
 /// Bins of a decade of magnitudes.
 const PER_DECADE: f64 = 4.0;
@@ -95,11 +96,11 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         Ok(Figure { id, thesis, title, svg, caption, origin: Origin::Measured, playback: None })
     };
     let figures = vec![
-        spread("figure-4-5", "Figure 4.5", "Input numbers in binary32, by magnitude", &values)?,
-        spread("figure-4-6", "Figure 4.6", "The same numbers rounded to binary16", &halves)?,
+        spread("figure-4-5", "§4.6.2, Figure 4.5", "Input numbers in binary32, by magnitude", &values)?,
+        spread("figure-4-6", "§4.6.2, Figure 4.6", "The same numbers rounded to binary16", &halves)?,
         scatter(
             "figure-4-7",
-            "Figure 4.7",
+            "§4.6.2, Figure 4.7",
             "Error of binary16 on all input numbers",
             all,
             "Each dot is a number: all errors of 1 % and more, and a sample of the smaller ones. Below 6.1e-5 binary16 has subnormal numbers, and \
@@ -108,28 +109,29 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         )?,
         scatter(
             "figure-4-8",
-            "Figure 4.8",
+            "§4.6.2, Figure 4.8",
             "The same without errors of 1 % and more",
             cut_dots,
             format!("{:.3} % of the numbers that are not 0.", loss.under_share() * 100.0),
         )?,
     ];
     let command = step.formats_command();
-    let row = |thesis: &str, subject: &str, recorded: &str, ours, shown: &str| Row {
+    let row = |thesis: &str, subject: &str, recorded: String, ours, shown: &str| Row {
         thesis: thesis.to_owned(),
         subject: subject.to_owned(),
-        recorded: recorded.to_owned(),
+        recorded,
         ours,
         origin: Origin::Measured,
         command: command.clone(),
         shown: shown.to_owned(),
     };
     let size = |size: Option<f32>| size.map_or("none".to_owned(), |size| format!("{size:.2e}"));
+    let [smallest, largest] = INPUT.magnitudes;
     let rows = vec![
         row(
             "§4.6.2, Figures 4.5 and 4.6",
             "magnitudes of the input",
-            "3.0e-5 to 450",
+            format!("{smallest:.1e} to {largest}"),
             format!(
                 "{} to {}; {:.2} % below 3e-5",
                 size(sizes.smallest),
@@ -141,14 +143,14 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         row(
             "§4.6.2, Figure 4.7",
             "mean error of the input in binary16",
-            "0.02 %",
+            format!("{} %", INPUT.mean_percent),
             format!("{:.4} %", loss.mean() * 100.0),
             "figure-4-7",
         ),
         row(
             "§4.6.2, Figure 4.8",
             "input numbers with an error below 1 % in binary16",
-            "99.93 %",
+            format!("{:.2} %", INPUT.under_1_percent_share * 100.0),
             format!("{:.3} %", loss.under_share() * 100.0),
             "figure-4-8",
         ),

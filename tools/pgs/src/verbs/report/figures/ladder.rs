@@ -32,6 +32,17 @@ pub(crate) fn part() -> Result<Part, Failure> {
         command: COMMAND.to_owned(),
         shown: figure.id.to_owned(),
     };
-    let rows = outcome.rungs.iter().map(row).collect();
+    let interval = |rung: &Rung| {
+        let recorded = rung.recorded_interval?;
+        let (streams, ports) = (rung.interval_by_streams?, rung.interval_by_ports?);
+        Some(Row {
+            subject: format!("cycles from an issue to the next (II): {}", rung.design),
+            recorded: recorded.to_string(),
+            ours: format!("{}: {streams} by the streams, {ports} by the ports", streams.max(ports)),
+            ..row(rung)
+        })
+    };
+    let rows = outcome.rungs.iter().flat_map(|rung| [Some(row(rung)), interval(rung)]);
+    let rows = rows.flatten().collect();
     Ok(Part { figures: vec![figure], rows })
 }

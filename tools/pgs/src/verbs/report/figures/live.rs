@@ -1,5 +1,6 @@
 //! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
 
+use bitstream_model::estimate::thesis::BODIES;
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve};
 
 use super::super::chart::{Axis, Drawn, Series, lines};
@@ -7,9 +8,8 @@ use super::super::document::{Figure, Origin, Part, Row};
 use super::super::step::{DEPTH, Step};
 use crate::failure::Failure;
 use crate::numbers::grouped;
+use crate::verbs::study::recorded::{MOST_ALIVE, MOST_ALIVE_PERCENT};
 
-/// Bodies that the thesis' order keeps alive at most.
-const RECORDED: u32 = 1528;
 /// Ranges of slots; a curve shows the maximum of each.
 const RANGES: usize = 400;
 
@@ -23,6 +23,13 @@ fn thinned(alive: &[u32]) -> Vec<(f64, f64)> {
         from += f64::from(u32::try_from(range.len()).unwrap_or(u32::MAX));
     }
     points
+}
+
+/// The thesis' number and share, and the share that its numbers give.
+fn recorded_share() -> String {
+    let [most, bodies] = [MOST_ALIVE.into(), BODIES].map(grouped);
+    let share = 100.0 * f64::from(MOST_ALIVE) / BODIES as f64;
+    format!("{most} of {bodies} ({MOST_ALIVE_PERCENT} %; {most} / {bodies} is {share:.2} %)")
 }
 
 pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
@@ -48,15 +55,15 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
     }
     let end =
         series.iter().flat_map(|series| series.points.last()).map(|at| at.0).fold(1.0, f64::max);
-    let recorded = f64::from(RECORDED);
+    let recorded = f64::from(MOST_ALIVE);
     series.push(Series::new(
-        "1,528, the thesis' largest",
+        format!("{}, the thesis' largest", grouped(MOST_ALIVE.into())),
         Drawn::Dashes,
         vec![(0.0, recorded), (end, recorded)],
     ));
     let figure = Figure {
         id: "figure-4-13",
-        thesis: "Figure 4.13",
+        thesis: "§4.7, Figure 4.13",
         title: "Bodies to keep on chip along the sorted collisions".to_owned(),
         svg: lines(Axis::linear("issue slot"), Axis::log("bodies alive"), &series)?,
         caption: format!(
@@ -76,9 +83,9 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
         .collect();
     let moving = input.moving.iter().filter(|moving| **moving).count();
     let row = Row {
-        thesis: "§4.7, Figure 4.13, Algorithm 3".to_owned(),
+        thesis: format!("{}, Algorithm 3", figure.thesis),
         subject: format!("most bodies alive of {}", grouped(moving as u64)),
-        recorded: "1,528 of 38,880 (3.85 %; 1,528 / 38,880 is 3.93 %)".to_owned(),
+        recorded: recorded_share(),
         ours: ours.join("; "),
         origin: Origin::Measured,
         command: step.order_command(),
@@ -90,6 +97,11 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_recorded_share_is_printed_beside_the_one_that_its_numbers_give() {
+        assert_eq!(recorded_share(), "1,528 of 38,880 (3.85 %; 1,528 / 38,880 is 3.93 %)");
+    }
 
     #[test]
     fn a_thinned_curve_keeps_the_largest_of_each_range() {

@@ -39,13 +39,14 @@ fn over_steps(many: &Studied<Outcome>) -> Result<Figure, Failure> {
     ];
     Ok(Figure {
         id: "figure-4-2",
-        thesis: "Figure 4.2",
+        thesis: "§4.5, Figure 4.2",
         title: "Deviation of positions between two executions, step by step".to_owned(),
         svg: lines(Axis::linear("step"), Axis::log("mean deviation (eq. 4.1), %"), &series)?,
         caption: format!(
-            "{}: the runs differ by the order of their collisions alone. The thesis does not say how \
-             many steps lie between its two executions.",
-            many.subject
+            "{}: the runs differ by the order of their collisions alone, and the GPU's order is {}. The \
+             thesis does not say after how many steps its snapshots were taken.",
+            many.subject,
+            source(&many.outcome)
         ),
         origin: Origin::Measured,
         playback: None,
@@ -67,84 +68,101 @@ fn after_steps(one: &Studied<Outcome>, many: &Studied<Outcome>) -> Result<Figure
     }
     Ok(Figure {
         id: "figure-4-9",
-        thesis: "Figure 4.9",
-        title: "Deviation of positions between the accelerator's order and the GPU's".to_owned(),
+        thesis: "§4.6.3, Figure 4.9",
+        title: "Deviation of positions between the order as given and the GPU's".to_owned(),
         svg: spread(series, &FLOAT_AGAINST_GPU)?,
         caption: format!(
-            "One step: {}, the GPU's order from {}. Many: {}. A step moves a body by \
-             centimetres, its position is metres: one step leads to less than the thesis' figures.",
-            one.subject, one.outcome.gpu_order, many.subject
+            "Both orders are solved on the emulated board: no GPU takes part. One step: {}, the GPU's order \
+             {}. Many: {}, the GPU's order {}; {}. A step moves a body by centimetres, its position is \
+             metres: one step leads to less than the thesis' figures.",
+            one.subject,
+            source(&one.outcome),
+            many.subject,
+            source(&many.outcome),
+            match step_of_recorded_share(&many.outcome) {
+                Some(step) =>
+                    format!("step {step} is the first with the thesis' share or less below 1 %"),
+                None => "the share below 1 % stays above the thesis'".to_owned(),
+            }
         ),
         origin: Origin::Measured,
         playback: None,
     })
 }
 
+/// The source of the order that stands for the GPU's.
+fn source(outcome: &Outcome) -> String {
+    match outcome.gpu_order {
+        "cells" => "reconstructed by Bullet's cells and batches (cells)".to_owned(),
+        file => format!("as Bullet recorded it ({file})"),
+    }
+}
+
+/// The steps after which a study compares.
+fn after(studied: &Studied<Outcome>) -> String {
+    match studied.outcome.gpu.curve.last().map_or(0, |at| at.step) {
+        1 => "after one step".to_owned(),
+        steps => format!("after {steps} steps"),
+    }
+}
+
+/// The rows of one study; its command prints their figures.
+fn rows(studied: &Studied<Outcome>) -> Vec<Row> {
+    let after = after(studied);
+    let row = |figure: &str, shown: &str, subject: String, recorded: String, ours| Row {
+        thesis: figure.to_owned(),
+        subject: format!("{subject}, {after}"),
+        recorded,
+        ours,
+        origin: Origin::Measured,
+        command: studied.command.clone(),
+        shown: shown.to_owned(),
+    };
+    let mut rows = Vec::new();
+    if let Some(last) = studied.outcome.over_pairs.last() {
+        let [low, high] = TWO_GPU_RUNS.mean_percent;
+        let of = last.position_mean_percent;
+        rows.push(row(
+            TWO_GPU_RUNS.thesis,
+            "figure-4-2",
+            "mean deviation of positions between two random orders, for two executions on the GPU"
+                .to_owned(),
+            format!("{low} % to {high} %"),
+            match studied.outcome.pairs.len() {
+                1 => format!("{:.4} %", of.mean),
+                pairs => {
+                    format!("{:.4} ± {:.4} % ({pairs} pairs)", of.mean, of.standard_deviation)
+                }
+            },
+        ));
+    }
+    if let Some(last) = studied.outcome.gpu.curve.last() {
+        let position = last.state.position;
+        let orders = format!(
+            "the order as given against the GPU's order ({}), both on the emulated board",
+            studied.outcome.gpu_order
+        );
+        for (what, recorded, ours) in [
+            (
+                "positions that deviate by less than 1 %",
+                format!("{:.2} %", recorded_share()),
+                percent(position.under_share()),
+            ),
+            (
+                "mean deviation of positions",
+                format!("{} %", FLOAT_AGAINST_GPU.mean_percent[0]),
+                format!("{:.4} %", position.mean * 100.0),
+            ),
+        ] {
+            let subject = format!("{what}: {orders}");
+            rows.push(row(FLOAT_AGAINST_GPU.thesis, "figure-4-9", subject, recorded, ours));
+        }
+    }
+    rows
+}
+
 pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
     let (one, many) = (effort.orders_of_one_step()?, effort.orders_of_many_steps()?);
     let figures = vec![over_steps(&many)?, after_steps(&one, &many)?];
-    let mut rows = Vec::new();
-    let mut row = |thesis: &str,
-                   subject: &str,
-                   recorded: &str,
-                   ours,
-                   studied: &Studied<Outcome>,
-                   shown: &str| {
-        rows.push(Row {
-            thesis: thesis.to_owned(),
-            subject: subject.to_owned(),
-            recorded: recorded.to_owned(),
-            ours,
-            origin: Origin::Measured,
-            command: studied.command.clone(),
-            shown: shown.to_owned(),
-        });
-    };
-    let (first, last) = (one.outcome.over_pairs.last(), many.outcome.over_pairs.last());
-    if let (Some(first), Some(last)) = (first, last) {
-        row(
-            "§4.5, Figure 4.2",
-            "mean deviation of two executions",
-            &format!("{} % to {} %", TWO_GPU_RUNS.mean_percent[0], TWO_GPU_RUNS.mean_percent[1]),
-            format!(
-                "{:.4} ± {:.4} % after one step, {:.2} % after {}",
-                first.position_mean_percent.mean,
-                first.position_mean_percent.standard_deviation,
-                last.position_mean_percent.mean,
-                last.step
-            ),
-            &many,
-            "figure-4-2",
-        );
-    }
-    let ends = (one.outcome.gpu.curve.last(), many.outcome.gpu.curve.last());
-    if let (Some(first), Some(last)) = ends {
-        let [one_step, steps] = [first, last].map(|at| at.state.position);
-        let reached = match step_of_recorded_share(&many.outcome) {
-            Some(step) => format!("{:.2} % is passed in step {step}", recorded_share()),
-            None => format!("{} after {} steps", percent(steps.under_share()), last.step),
-        };
-        row(
-            "§4.6.3, Figure 4.9",
-            "positions of the accelerator that deviate from the GPU's by less than 1 %",
-            &format!("{:.2} %", recorded_share()),
-            format!("{} after one step; of our pile {reached}", percent(one_step.under_share())),
-            &one,
-            "figure-4-9",
-        );
-        row(
-            "§4.6.3, Figure 4.9",
-            "mean deviation of the accelerator's positions from the GPU's",
-            &format!("{} %", FLOAT_AGAINST_GPU.mean_percent[0]),
-            format!(
-                "{:.4} % after one step; of our pile {:.2} % after {}",
-                one_step.mean * 100.0,
-                steps.mean * 100.0,
-                last.step
-            ),
-            &one,
-            "figure-4-9",
-        );
-    }
-    Ok(Part { figures, rows })
+    Ok(Part { figures, rows: [rows(&one), rows(&many)].concat() })
 }

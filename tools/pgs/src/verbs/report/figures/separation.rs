@@ -118,7 +118,7 @@ pub(crate) fn part() -> Part {
     let gaps = [&apart, &touching].map(|pair| widest(&pair[0], &pair[1]).1);
     let figure = Figure {
         id: "figure-2-8",
-        thesis: "Figure 2.8",
+        thesis: "§2.2.2, Figure 2.8",
         title: "The separating axis of two convex bodies".to_owned(),
         svg,
         caption: "(A) The shadows of both boxes on the axis do not overlap, and a plane (dashed) \
@@ -130,7 +130,7 @@ pub(crate) fn part() -> Part {
         playback: None,
     };
     let row = Row {
-        thesis: "§2.2.2, Figure 2.8".to_owned(),
+        thesis: figure.thesis.to_owned(),
         subject: "separating axis test".to_owned(),
         recorded: "shadows apart: no collision; overlap on every axis: collision".to_owned(),
         ours: format!(

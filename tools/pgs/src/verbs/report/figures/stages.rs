@@ -67,14 +67,14 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
     let figures = vec![
         figure(
             "figure-5-1",
-            "Figure 5.1",
+            "§5.1.1, Figure 5.1",
             "Stages of a step without a pipeline (profile naive)",
             one_by_one,
             "One stream of 32 bits: a collision is solved when all of its words have come.",
         ),
         figure(
             "figure-5-2",
-            "Figure 5.2",
+            "§5.1.1, Figure 5.2",
             "The same step with a pipeline, on four channels (profile float)",
             pipelined,
             "Four streams of 128 bits: a collision enters every two cycles unless it must wait for a body.",
@@ -91,7 +91,7 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
         )
     };
     let row = |figure: &Figure, profile: &Profile, cycles: u64| Row {
-        thesis: format!("§5.1, {}", figure.thesis),
+        thesis: figure.thesis.to_owned(),
         subject: format!("a step of {} cubes, profile {}", SIDE * SIDE * SIDE, profile.name),
         recorded: "a drawing, no numbers".to_owned(),
         ours: format!("{} cycles on the emulated board", grouped(cycles)),

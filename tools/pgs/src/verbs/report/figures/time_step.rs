@@ -30,7 +30,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
     ];
     let figure = Figure {
         id: "figure-2-2",
-        thesis: "Figure 2.2",
+        thesis: "§2.1.1, Figure 2.2",
         title: "Speed and accuracy against the time step".to_owned(),
         svg: lines(Axis::linear("time step, ms"), Axis::log("error in mm, cost in ms"), &series)?,
         caption: format!(
@@ -51,7 +51,7 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
         )
     });
     let row = Row {
-        thesis: "§2.1.1, Figure 2.2".to_owned(),
+        thesis: figure.thesis.to_owned(),
         subject: "accuracy against the time step".to_owned(),
         recorded: "a smaller step is more accurate and slower (no numbers)".to_owned(),
         ours: ours.collect::<Vec<_>>().join("; "),

@@ -62,9 +62,6 @@ pub(in super::super) fn show(outcome: &Outcome, out: &mut dyn Write) -> Result<(
         writeln!(out)?;
         decades(histograms, out)?;
     }
-    if !outcome.complete {
-        writeln!(out, "interrupted")?;
-    }
     Ok(())
 }
 

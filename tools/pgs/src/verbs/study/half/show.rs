@@ -76,9 +76,6 @@ pub(in super::super) fn show(outcome: &Outcome, out: &mut dyn Write) -> Result<(
     writeln!(out, "splits of sixteen bits, on the numbers of a step")?;
     heading(out, &SPLITS)?;
     outcome.splits.iter().try_for_each(|split| line(out, &SPLITS, split_cells(split)))?;
-    if !outcome.complete {
-        writeln!(out, "interrupted")?;
-    }
     Ok(())
 }
 

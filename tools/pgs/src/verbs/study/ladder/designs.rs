@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::data::{DataRow, TABLES};
-use bitstream_model::estimate::thesis::recorded::Design;
+use bitstream_model::estimate::thesis::recorded::{Design, ONE_COPY_INTERVAL};
 use bitstream_model::estimate::{PORTS, PortAccount, Records, StepCycles, StepShape, StepTime};
 use bitstream_model::interface::profile::{
     FLOAT, HALF, NAIVE, OnChipMemory, Profile, THESIS_WORDS,
@@ -63,6 +63,8 @@ pub(super) struct Modelled {
     pub(super) sustained: Option<f64>,
     pub(super) bound_by: &'static str,
     pub(super) recorded: Option<&'static Design>,
+    /// Cycles from an issue to the next, as the thesis tells them.
+    pub(super) recorded_interval: Option<u32>,
 }
 
 /// The row of the array that holds the velocities on chip.
@@ -144,12 +146,19 @@ pub(super) fn designs(step: &StepShape) -> [Modelled; 8] {
             VelocityRow::Whole,
             named("float", "§5.4.3, §5.4.4", "a velocity is one row: an issue every 2 cycles"),
         ),
-        by_profile(
-            step,
-            &ONE_COPY_HALF,
-            VelocityRow::Whole,
-            named(ONE_COPY_HALF.name, "§5.5.2", "sixteen bits, two collisions an issue, 250 MHz"),
-        ),
+        Modelled {
+            recorded_interval: Some(ONE_COPY_INTERVAL),
+            ..by_profile(
+                step,
+                &ONE_COPY_HALF,
+                VelocityRow::Whole,
+                named(
+                    ONE_COPY_HALF.name,
+                    "§5.5.2",
+                    "sixteen bits, two collisions an issue, 250 MHz",
+                ),
+            )
+        },
         by_profile(
             step,
             &HALF,
@@ -181,6 +190,7 @@ fn by_accesses(step: &StepShape) -> Modelled {
         sustained: None,
         bound_by: "accesses",
         recorded: None,
+        recorded_interval: None,
     }
 }
 
@@ -224,6 +234,7 @@ fn by_profile(
     let sustained = Bandwidth::ZCU102_SUSTAINED;
     let time = StepTime::new(&variant, Records::Packed, step, sustained);
     let Profile { initiation_interval: interval, collisions_per_issue: each, .. } = *profile;
+    let recorded = Design::of(profile).filter(|design| design.profile.name == profile.name);
     let issues = if each == 1 { "C".to_owned() } else { format!("ceil(C / {each})") };
     Modelled {
         named,
@@ -241,6 +252,7 @@ fn by_profile(
             Ordering::Equal => "both",
             Ordering::Greater => "streams",
         },
-        recorded: Design::of(profile).filter(|design| design.profile.name == profile.name),
+        recorded,
+        recorded_interval: recorded.map(|design| design.initiation_interval),
     }
 }

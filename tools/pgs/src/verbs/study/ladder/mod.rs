@@ -71,6 +71,8 @@ pub(crate) struct Rung {
     pub(crate) interval_by_streams: Option<u32>,
     /// Cycles an issue that the block RAM allows.
     pub(crate) interval_by_ports: Option<u32>,
+    /// Cycles an issue that the thesis prints.
+    pub(crate) recorded_interval: Option<u32>,
     pub(crate) collisions_per_issue: u32,
     /// Cycles of a step; the least, if accesses take a range of cycles.
     pub(crate) cycles: u64,
@@ -92,7 +94,7 @@ pub(crate) struct Rung {
 /// Models the ladder.
 pub(crate) fn measure(options: &Options) -> Outcome {
     let step = StepShape::new(options.bodies, options.collisions);
-    let is_thesis_step = step == StepShape::new(thesis::BODIES, thesis::COLLISIONS);
+    let is_thesis_step = step == thesis::step();
     let mut rungs: Vec<Rung> = Vec::new();
     for modelled in designs(&step) {
         let milliseconds = modelled.cycles[0] as f64 / f64::from(modelled.clock_khz);
@@ -104,6 +106,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
             formula: modelled.formula,
             interval_by_streams: modelled.intervals.map(|[streams, _]| streams),
             interval_by_ports: modelled.intervals.map(|[_, ports]| ports),
+            recorded_interval: modelled.recorded_interval,
             collisions_per_issue: modelled.collisions_per_issue,
             cycles: modelled.cycles[0],
             cycles_most: modelled.cycles[1],
@@ -157,6 +160,17 @@ mod tests {
             let issues = 8 * 127_000 / u64::from(rung.collisions_per_issue);
             let interval = rung.cycles / issues;
             assert_eq!(interval, u64::from(streams.max(ports)), "{}", rung.design);
+        }
+    }
+
+    #[test]
+    fn the_thesis_intervals_are_those_of_streams_and_ports() {
+        let rungs = measure(&Options::default()).rungs;
+        let printed: Vec<_> = rungs.iter().filter_map(|rung| rung.recorded_interval).collect();
+        assert_eq!(printed, [2, 4, 3]);
+        for rung in rungs.iter().filter(|rung| rung.recorded_interval.is_some()) {
+            let ours = rung.interval_by_streams.max(rung.interval_by_ports);
+            assert_eq!(ours, rung.recorded_interval, "{}", rung.design);
         }
     }
 

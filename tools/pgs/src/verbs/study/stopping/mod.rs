@@ -11,7 +11,7 @@ mod show;
 use std::path::PathBuf;
 
 use clap::Args;
-use scene::{Grid, Scene, SceneOptions};
+use scene::Grid;
 use serde::Serialize;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
@@ -26,7 +26,9 @@ use crate::board::{self, OpenBoard};
 use crate::failure::Failure;
 use crate::options::scenes;
 use crate::options::solver::SolverArgs;
+use crate::pile;
 use crate::step_input;
+use step_folder::folder::Folder;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -110,11 +112,20 @@ pub(crate) struct Rules {
 /// The measured step.
 #[derive(Debug)]
 struct Step {
+    /// None for a pile's.
+    folder: Option<Folder>,
     name: String,
     bodies: Vec<Body>,
     shapes: Vec<Shape>,
     collisions: Vec<Collision>,
     parameters: StepParameters,
+}
+
+impl Step {
+    /// Makes a failure of the driver's error; for a folder, with the array at fault.
+    fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
+        step_input::failure(self.folder.as_ref(), opened, error)
+    }
 }
 
 /// Takes the step with each number of passes.
@@ -127,7 +138,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
     };
     let Some(step) = step else { return Ok(interrupted(options)) };
     step_input::set_shapes(&mut opened.accelerator, &step.shapes)
-        .map_err(|error| opened.failure(error))?;
+        .map_err(|error| step.failure(&opened, error))?;
     let problem = Problem::new(&step.bodies, &step.shapes, &step.collisions, &step.parameters);
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
     session.expect(2 * u64::from(options.passes) + 2);
@@ -184,9 +195,10 @@ fn folder(path: &std::path::Path, options: &Options) -> Result<Step, Failure> {
     Ok(Step {
         name: path.display().to_string(),
         parameters: options.solver.apply(folder.parameters),
-        bodies: folder.bodies,
-        shapes: folder.shapes,
-        collisions: folder.collisions,
+        bodies: folder.bodies.clone(),
+        shapes: folder.shapes.clone(),
+        collisions: folder.collisions.clone(),
+        folder: Some(folder),
     })
 }
 
@@ -196,24 +208,18 @@ fn pile(
     session: &Session,
     opened: &mut OpenBoard,
 ) -> Result<Option<Step>, Failure> {
-    scenes::check_rows(options.grid)?;
     let parameters = options.solver.apply(StepParameters::default());
     let Options { grid, drop, steps, .. } = *options;
-    let mut scene = Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() })
-        .map_err(Failure::input)?;
+    scenes::check_size(grid, opened.accelerator.capabilities())?;
+    let mut scene = pile::build(grid, drop)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     session.expect(steps.into());
-    for _ in 0..steps {
-        scene.detect();
-        let (bodies, collisions) = scene.parts_mut();
-        match opened.accelerator.step(bodies, collisions, &parameters) {
-            Ok(_) => session.advance(),
-            Err(error) if board::is_cancelled(&error) => return Ok(None),
-            Err(error) => return Err(opened.failure(error)),
-        }
-    }
-    scene.detect();
-    Ok(Some(Step {
+    let taken = pile::approach(&mut scene, opened, &parameters, steps, || {
+        session.advance();
+        !session.is_interrupted()
+    })?;
+    Ok(taken.then(|| Step {
+        folder: None,
         name: format!("step {} of {grid} cubes dropped from {drop} m", steps + 1),
         bodies: scene.bodies().to_vec(),
         shapes: scene.shapes().to_vec(),

@@ -98,7 +98,7 @@ impl Course<'_> {
         match accelerator.step(&mut bodies, &self.step.collisions, &parameters) {
             Ok(_) => {}
             Err(error) if board::is_cancelled(&error) => return Ok(None),
-            Err(error) => return Err(self.opened.failure(error)),
+            Err(error) => return Err(self.step.failure(self.opened, error)),
         }
         self.opened.alive()?;
         self.session.advance();
