@@ -8,8 +8,8 @@
 #   --steps   steps before the counted one; default: 45
 #
 # Callgrind counts the instructions of `pgs study split` and simulates the caches of the ZCU102's A53. The
-# instructions are those of x86-64: an aarch64 build differs by tens of percent, in both parts alike or not. The
-# prefetcher is left out. Four machines are computed: one instruction a clock and two, and two times for memory.
+# instructions are those of x86-64: an aarch64 build differs by tens of percent. The prefetcher is left out. Four
+# cores are computed: one instruction a clock and two, each with two times for memory.
 #
 # Exit code: 0 done, 1 nothing can be counted, 2 wrong usage, 77 skipped: not on this machine.
 set -euo pipefail
@@ -30,7 +30,7 @@ done
 command -v valgrind >/dev/null || need_packages valgrind
 cd "$repository"
 
-true
+cargo build --release --locked --quiet -p pgs || fail "pgs cannot be built"
 counts=$(mktemp -d)
 litter+=("$counts")
 
