@@ -23,9 +23,9 @@ pub enum StreamFormat {
     /// [`Thesis16`](Self::Thesis16) with the encoder taken literally: it cuts three bits out of the
     /// exponent whatever they are. Words are read alike.
     ///
-    /// From 2^-15 up to 2^16 the words are those of thesis16. A smaller magnitude has its exponent
-    /// modulo 16 and reads as a number from 2^-15 up to 2: 2^-16 as 1, zero as 2^-15. A magnitude of
-    /// 2^17 or more reads as one from 2 up to 2^17.
+    /// A word keeps the top bit and the four low bits of the biased exponent. From 2^-15 up to 2^17
+    /// the words are those of thesis16. A smaller magnitude reads as one from 2^-15 up to 2: 2^-16 as
+    /// 1, zero as 2^-15. A larger one reads as one from 2 up to 2^16, or as overflow (F = 31).
     Thesis16Literal = 3,
 }
 

@@ -84,7 +84,7 @@ pub(crate) struct Surroundings<'a> {
 }
 
 /// Everything outside a core that a write to a register needs.
-pub(crate) struct WriteSurroundings<'a> {
+pub(crate) struct WriteContext<'a> {
     pub(crate) log: &'a mut Log,
     pub(crate) faults: &'a mut Faults,
     /// Takes notes, if the board is to be recorded.
@@ -159,9 +159,9 @@ impl Core {
         now: u64,
         offset: u32,
         value: u32,
-        with: WriteSurroundings<'_>,
+        with: WriteContext<'_>,
     ) -> Option<bool> {
-        let WriteSurroundings { log, faults, recorder } = with;
+        let WriteContext { log, faults, recorder } = with;
         let (direction, at) = Self::decode(offset);
         if self.reset_until.is_some() {
             // The core is deaf until the reset has ended.

@@ -241,13 +241,13 @@ impl Channel {
         }
         if let Some(recorder) = &mut with.recorder {
             let (core, direction) = (build.core, self.direction);
-            let before = self.beats - n as u64;
+            let beats_before = self.beats - n as u64;
             let moved = MovedBeats {
                 beats: n as u64,
                 clocks: 1 << self.beat_shift(build),
                 last: ends || direction == Direction::Mm2s && stream.ends_with_last(),
-                before,
-                phase: with.faults.phase(core, direction).filter(|_| before == 0),
+                beats_before,
+                phase: with.faults.phase(core, direction).filter(|_| beats_before == 0),
             };
             recorder.moves((core, direction), begin, &moved);
         }

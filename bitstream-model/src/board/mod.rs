@@ -13,7 +13,7 @@ use self::bus::Target;
 use self::interrupt::InterruptLine;
 use self::short_cut::{ShortCut, Stretch};
 use crate::accelerator::Accelerator;
-use crate::axi_dma::{Core, Moved, PacketCount, Surroundings, WriteSurroundings};
+use crate::axi_dma::{Core, Moved, PacketCount, Surroundings, WriteContext};
 use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
 use crate::external::{ExternalAccelerator, ExternalError, Installed};
@@ -257,7 +257,7 @@ impl Board {
         let done = match bus::decode(address, self.cores.len()) {
             Target::Dma { core, offset } => {
                 let recorder = self.recorder.as_deref_mut();
-                let with = WriteSurroundings { log, faults, recorder };
+                let with = WriteContext { log, faults, recorder };
                 let done = self.cores[core].write(now, offset, value, with);
                 done.ok_or(ViolationKind::ReservedRegister { address })
             }

@@ -203,16 +203,22 @@ pub enum ConfigError {
     },
     /// A format without infinity, the distance of an unused contact point.
     #[error(
-        "collisions relative to body A in {0}, which has no infinity to mark an unused contact \
+        "collisions relative to body A in {format}, which has no infinity to mark an unused contact \
          point with; expected f32 or binary16"
     )]
-    NoInfinity(&'static str),
+    NoInfinity {
+        /// The format of the collisions.
+        format: &'static str,
+    },
     /// World inertia in a format without zero, which static bodies need.
     #[error(
-        "world inertia in {0}, which has no zero for the inverse inertia of a static body; \
+        "world inertia in {format}, which has no zero for the inverse inertia of a static body; \
          expected f32 or binary16"
     )]
-    NoZero(&'static str),
+    NoZero {
+        /// The format of the bodies.
+        format: &'static str,
+    },
     /// Constraint rows of higher precision than the updates that use them.
     #[error(
         "constraint rows in f32 and updates in binary16, which cannot take them; expected updates \
@@ -364,10 +370,10 @@ impl BoardConfig {
         }
         let relative = self.profile.geometry == Geometry::Relative;
         if relative && !asked.collisions.has_zero_and_infinity() {
-            return Err(ConfigError::NoInfinity(asked.collisions.name()));
+            return Err(ConfigError::NoInfinity { format: asked.collisions.name() });
         }
         if self.inertia == Inertia::World && !asked.bodies.has_zero_and_infinity() {
-            return Err(ConfigError::NoZero(asked.bodies.name()));
+            return Err(ConfigError::NoZero { format: asked.bodies.name() });
         }
         if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
             return Err(ConfigError::RowsBeyondUpdates);

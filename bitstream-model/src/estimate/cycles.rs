@@ -29,7 +29,7 @@ pub struct StepShape {
 impl StepShape {
     /// Four contact and four friction passes.
     ///
-    /// The thesis prints no number of passes, its Algorithm 2 has an "iteration limit" (§2.2.3). Eight
+    /// The thesis prints no number of passes; its Algorithm 2 has an "iteration limit" (§2.2.3). Eight
     /// are inferred from its cycles: a pass over 127,000 collisions (§4.4.1) takes 254,000 cycles in
     /// float, and eight leave 30,697 of Table 6.4's 2,062,697 for load and integration, which take
     /// 31,590 by the formula. In half a pass takes 190,500, and eight leave 33,317 of Table 6.8's
@@ -128,9 +128,10 @@ impl StepCycles {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::thesis;
     use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
 
-    const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
+    const THESIS_STEP: StepShape = thesis::step();
 
     fn cycles(profile: &'static Profile, records: Records) -> StepCycles {
         StepCycles::new(&profile.default_variant(), records, &THESIS_STEP)

@@ -118,9 +118,10 @@ fn interval_limit(variant: &Variant) -> PartLimit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::thesis;
     use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
 
-    const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
+    const THESIS_STEP: StepShape = thesis::step();
 
     fn time(profile: &'static Profile, bandwidth: Bandwidth) -> StepTime {
         StepTime::new(&profile.default_variant(), Records::Streamed, &THESIS_STEP, bandwidth)

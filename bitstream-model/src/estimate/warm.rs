@@ -82,9 +82,10 @@ impl WarmCost {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::thesis;
     use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
 
-    const THESIS_STEP: StepShape = StepShape::new(38_880, 127_000);
+    const THESIS_STEP: StepShape = thesis::step();
 
     #[test]
     fn a_pass_of_each_kind_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes() {

@@ -29,7 +29,7 @@ struct OpenPacket {
     /// Descriptors of it that have ended.
     descriptors: u32,
     /// It began before the recording.
-    is_rest: bool,
+    began_before_recording: bool,
 }
 
 /// The recording of a channel, and the descriptor and packet under way.
@@ -54,7 +54,7 @@ impl Channel {
             let bytes = beats * BEAT_BYTES as u64;
             self.recording.descriptors.push(DescriptorSpan { span, address, bytes, ended: false });
         }
-        let packet = self.packet.take().filter(|packet| !packet.is_rest);
+        let packet = self.packet.take().filter(|packet| !packet.began_before_recording);
         if let Some(OpenPacket { begin, phase, beats, descriptors, .. }) = packet {
             let span = Span { begin, end };
             let packet = PacketSpan { span, phase, beats, descriptors, ended: false };
@@ -72,7 +72,7 @@ pub(crate) struct MovedBeats {
     /// Whether the last one carries TLAST.
     pub(crate) last: bool,
     /// Beats of the same packet before them.
-    pub(crate) before: u64,
+    pub(crate) beats_before: u64,
     /// The phase whose records the packet carries.
     pub(crate) phase: Option<StepPhase>,
 }
@@ -170,15 +170,21 @@ impl Recorder {
         begin: u64,
         moved: &MovedBeats,
     ) {
-        let MovedBeats { beats, clocks, last, before, phase } = *moved;
+        let MovedBeats { beats, clocks, last, beats_before, phase } = *moved;
         let exists = if direction == Direction::S2mm { self.sent_at } else { 0 };
         let Channel { recording: ChannelRecording { port, .. }, packet, descriptor } =
             self.channel(core, direction);
         let begin = begin.max(exists).max(port.last().map_or(0, PortState::end_of_beats));
         let goes_on = packet.is_some();
-        let is_rest = before > 0;
+        let began_before_recording = beats_before > 0;
         packet
-            .get_or_insert(OpenPacket { begin, phase, beats: 0, descriptors: 0, is_rest })
+            .get_or_insert(OpenPacket {
+                begin,
+                phase,
+                beats: 0,
+                descriptors: 0,
+                began_before_recording,
+            })
             .beats += beats;
         if let Some(descriptor) = descriptor {
             descriptor.beats += beats;
@@ -258,7 +264,7 @@ impl Recorder {
 
     pub(crate) fn packet_ends(&mut self, (core, direction): (usize, Direction), now: u64) {
         let channel = self.channel(core, direction);
-        let packet = channel.packet.take().filter(|packet| !packet.is_rest);
+        let packet = channel.packet.take().filter(|packet| !packet.began_before_recording);
         if let Some(OpenPacket { begin, phase, beats, descriptors, .. }) = packet {
             let span = Span { begin, end: now.max(channel.end_of_beats()) };
             let packet = PacketSpan { span, phase, beats, descriptors, ended: true };

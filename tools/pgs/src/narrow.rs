@@ -40,8 +40,8 @@ impl NarrowFormat {
         }
     }
 
-    /// Writes a finite number and reads it back. `None` for a NaN, and for a number that the driver
-    /// refuses to write.
+    /// Writes a number and reads it back. `None` for a NaN, and for a number that the driver refuses to
+    /// write; thesis16-literal has a word for every number, also for these.
     pub(crate) fn round_trip(self, value: f32) -> Option<f32> {
         let largest = match self {
             Self::Binary16 => StreamFormat::Binary16.largest(),
@@ -88,7 +88,8 @@ fn thesis16(value: f32) -> f32 {
     f32::from_bits(value.to_bits() & !0x1FFF)
 }
 
-/// Rounds a number as the streams of this format do; one that the driver refuses stays as it is.
+/// Rounds a number as the streams of this format do; one that the driver refuses stays as it is, also in
+/// thesis16-literal.
 pub(crate) fn carried(stream: StreamFormat, value: f32) -> f32 {
     let taken = |_: &NarrowFormat| value.abs() <= stream.largest();
     NarrowFormat::of(stream)

@@ -38,7 +38,7 @@ pub(crate) fn open(
 ///
 /// The collisions are solved in the order of their detection. A board that does not solve them one after
 /// the other would give a pile energy in this order, and takes the driver's.
-pub(crate) fn approach(
+pub(crate) fn step_to(
     scene: &mut Scene,
     opened: &mut OpenBoard,
     parameters: &StepParameters,
@@ -89,11 +89,11 @@ mod tests {
         }
         by_hand.detect();
         let defaults = StepParameters::default();
-        assert!(approach(&mut scene, &mut opened, &defaults, 40, || true).expect("steps"));
+        assert!(step_to(&mut scene, &mut opened, &defaults, 40, || true).expect("steps"));
         assert_eq!(scene.bodies(), by_hand.bodies());
         assert_eq!(scene.collisions(), by_hand.collisions());
         assert!(!scene.collisions().is_empty());
-        assert!(!approach(&mut scene, &mut opened, &defaults, 1, || false).expect("no step"));
+        assert!(!step_to(&mut scene, &mut opened, &defaults, 1, || false).expect("no step"));
     }
 
     #[test]

@@ -34,14 +34,14 @@ pub(crate) struct TracedArgs {
 /// Why a step has no files.
 const NOTHING: &str = "no clock of the step has passed on the board";
 
-/// Whether the files show the inside of a step.
+/// Whether the files of the traced step were written.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Inside {
-    /// They do.
-    Shown,
-    /// No file was written: the step was not reached, or ended before the board was asked for anything.
+pub(crate) enum TraceFiles {
+    /// All of them.
+    Written,
+    /// None: the step was not reached, or ended before the board was asked for anything.
     #[default]
-    Nothing,
+    NotWritten,
 }
 
 /// A board to record a step of.
@@ -85,16 +85,16 @@ impl TracedArgs {
     }
 
     /// The files, for people.
-    pub(crate) fn print(&self, inside: Inside, out: &mut dyn Write) -> io::Result<()> {
-        self.given().try_for_each(|(name, path)| match inside {
-            Inside::Shown => writeln!(out, "{name:<10} {}", path.display()),
-            Inside::Nothing => writeln!(out, "{name:<10} not written: {NOTHING}"),
+    pub(crate) fn print(&self, files: TraceFiles, out: &mut dyn Write) -> io::Result<()> {
+        self.given().try_for_each(|(name, path)| match files {
+            TraceFiles::Written => writeln!(out, "{name:<10} {}", path.display()),
+            TraceFiles::NotWritten => writeln!(out, "{name:<10} not written: {NOTHING}"),
         })
     }
 
     /// The same for programs; null without any.
-    pub(crate) fn to_json(&self, inside: Inside) -> Value {
-        match self.is_given() && inside == Inside::Shown {
+    pub(crate) fn to_json(&self, files: TraceFiles) -> Value {
+        match self.is_given() && files == TraceFiles::Written {
             true => json!({
                 "vcd": self.vcd.as_ref().map(|path| path.display().to_string()),
                 "trace": self.trace.as_ref().map(|path| path.display().to_string()),
@@ -113,12 +113,12 @@ impl Tracing<'_> {
 
     /// Ends the recording and writes the files; all of them, or none. A step that failed or was interrupted
     /// has no report.
-    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<Inside, Failure> {
+    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<TraceFiles, Failure> {
         match self.board.take_recording().filter(|recording| recording.span.clocks() > 0) {
-            Some(recording) => self.write(&recording, report).map(|()| Inside::Shown),
+            Some(recording) => self.write(&recording, report).map(|()| TraceFiles::Written),
             None => {
                 log::warn!("no file shows the step: {NOTHING}");
-                Ok(Inside::Nothing)
+                Ok(TraceFiles::NotWritten)
             }
         }
     }
@@ -152,11 +152,11 @@ mod tests {
     #[test]
     fn a_step_that_was_not_reached_names_no_file() {
         let args = TracedArgs { vcd: Some("step.vcd".into()), ..TracedArgs::default() };
-        assert_eq!(args.to_json(Inside::Nothing), Value::Null);
-        assert_eq!(args.to_json(Inside::Shown)["vcd"], "step.vcd");
-        assert_eq!(TracedArgs::default().to_json(Inside::Shown), Value::Null);
+        assert_eq!(args.to_json(TraceFiles::NotWritten), Value::Null);
+        assert_eq!(args.to_json(TraceFiles::Written)["vcd"], "step.vcd");
+        assert_eq!(TracedArgs::default().to_json(TraceFiles::Written), Value::Null);
         let mut out = Vec::new();
-        args.print(Inside::Nothing, &mut out).expect("a vector takes all");
+        args.print(TraceFiles::NotWritten, &mut out).expect("a vector takes all");
         let said = String::from_utf8(out).expect("text");
         assert!(said.starts_with("vcd        not written: "), "{said}");
     }

@@ -1,9 +1,10 @@
-//! What keeps a recording or a picture from becoming a file.
+//! The reasons why a recording or a picture becomes no file.
 
 use std::io;
 
 use scene::Geometry;
 use thiserror::Error;
+use zynq_pgs::Pose;
 
 use crate::recording::TooLarge;
 
@@ -11,6 +12,29 @@ use crate::recording::TooLarge;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ViewError {
+    /// The time of a frame.
+    #[error(
+        "expected a finite time of step {step}, found {found}: give a shorter time step, or take fewer steps"
+    )]
+    Time {
+        /// The step.
+        step: u32,
+        /// Its time, s.
+        found: f32,
+    },
+    /// The pose of a body.
+    #[error(
+        "expected a finite pose of body {body} after step {step}, with an orientation that is not 0, found \
+         position {:?} and orientation {:?}: record the steps before it", pose.position, pose.orientation
+    )]
+    Pose {
+        /// The step.
+        step: u32,
+        /// The body.
+        body: usize,
+        /// Its pose.
+        pose: Pose,
+    },
     /// The file's format cannot hold it.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),

@@ -20,4 +20,4 @@ mod quantise;
 mod recording;
 
 pub use error::ViewError;
-pub use recording::{Frame, NotFinite, Recording, TooLarge};
+pub use recording::{Frame, Recording, TooLarge};

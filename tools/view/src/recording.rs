@@ -4,6 +4,7 @@ use scene::Geometry;
 use thiserror::Error;
 use zynq_pgs::{Body, Pose};
 
+use crate::error::ViewError;
 use crate::kinds::Kinds;
 
 /// A file's format cannot hold a recording.
@@ -28,30 +29,8 @@ impl TooLarge {
     }
 }
 
-/// A frame that no file shows.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum NotFinite {
-    /// Its time.
-    #[error("expected a finite time of step {step}: give a shorter time step, or take fewer steps")]
-    Time {
-        /// The step.
-        step: u32,
-    },
-    /// The pose of a body.
-    #[error(
-        "expected a finite pose of body {body} after step {step}, with a direction: record the steps \
-         before it"
-    )]
-    Pose {
-        /// The step.
-        step: u32,
-        /// The body.
-        body: usize,
-    },
-}
-
-/// Whether a body can be shown there.
-fn is_finite(pose: &Pose) -> bool {
+/// Whether a file can show a pose: it is finite, and its orientation a direction.
+fn is_shown(pose: &Pose) -> bool {
     let turned = pose.orientation.iter().any(|value| value.abs() > 0.0);
     turned && pose.position.iter().chain(&pose.orientation).all(|value| value.is_finite())
 }
@@ -96,19 +75,19 @@ impl Recording {
     /// has its time. A body that `bodies` lacks stays where it was.
     ///
     /// # Errors
-    /// [`NotFinite`]: a pose, or the time, is not a finite one. The recording is as it was.
-    pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) -> Result<(), NotFinite> {
+    /// [`ViewError::Pose`], [`ViewError::Time`]: not finite. The recording is as it was.
+    pub fn add(&mut self, step: u32, time: f32, bodies: &[Body]) -> Result<(), ViewError> {
         if self.frames.last().is_some_and(|frame| frame.time.to_bits() == time.to_bits()) {
             return Ok(());
         }
         if !time.is_finite() {
-            return Err(NotFinite::Time { step });
+            return Err(ViewError::Time { step, found: time });
         }
         let last = self.frames.last().map(|frame| frame.poses.as_slice()).unwrap_or_default();
         let was = |place: usize| last.get(place).copied().unwrap_or(ORIGIN);
         let pose = |(place, index): (usize, &usize)| {
             let pose = bodies.get(*index).map_or_else(|| was(place), |body| body.pose);
-            is_finite(&pose).then_some(pose).ok_or(NotFinite::Pose { step, body: *index })
+            is_shown(&pose).then_some(pose).ok_or(ViewError::Pose { step, body: *index, pose })
         };
         let poses = self.bodies.iter().enumerate().map(pose).collect::<Result<_, _>>()?;
         self.frames.push(Frame { step, time, poses });
@@ -207,10 +186,14 @@ mod tests {
             let whole = bodies[2].pose;
             wrong(&mut bodies[2].pose);
             let refused = recording.add(1, 0.1, &bodies);
-            assert_eq!(refused, Err(NotFinite::Pose { step: 1, body: 2 }));
+            assert!(
+                matches!(refused, Err(ViewError::Pose { step: 1, body: 2, .. })),
+                "{refused:?}"
+            );
             bodies[2].pose = whole;
         }
-        assert_eq!(recording.add(1, f32::NAN, &bodies), Err(NotFinite::Time { step: 1 }));
+        let refused = recording.add(1, f32::NAN, &bodies);
+        assert!(matches!(refused, Err(ViewError::Time { step: 1, .. })), "{refused:?}");
         assert_eq!(recording.frames().len(), 1);
     }
 

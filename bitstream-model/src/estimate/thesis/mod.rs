@@ -15,8 +15,7 @@ pub const BODIES: u64 = 38_880;
 /// Collisions of the thesis' step.
 pub const COLLISIONS: u64 = 127_000;
 
-/// The thesis' step. It prints bodies and collisions; [`StepShape::new`] tells where its number of
-/// passes comes from.
+/// The thesis' step: bodies and collisions as printed, passes as [`StepShape::new`] infers them.
 #[must_use]
 pub const fn step() -> StepShape {
     StepShape::new(BODIES, COLLISIONS)

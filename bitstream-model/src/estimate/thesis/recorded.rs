@@ -203,6 +203,7 @@ mod tests {
             assert_near(GPU.watts / ZCU102_WATTS, design.power.gpu, 0.005, "power");
             let whole = amdahl(ACCELERATED_SHARE, GPU.latency_ms / design.latency_ms);
             assert_near(whole, design.whole_step, 0.005, "whole step");
+            assert_eq!(design.clock_mhz * 1000, design.profile.clock_khz);
         }
     }
 

@@ -12,8 +12,7 @@ pub(crate) const HWMON: &str = "/sys/class/hwmon";
 const PREFIX: &str = "ina226";
 /// Shortest time between two samples, whatever a sensor says.
 const INTERVAL_MIN: Duration = Duration::from_millis(10);
-/// Longest time between two samples. A slower sensor would repeat its values, and the repetitions make the
-/// standard error too small.
+/// Longest time between two samples: five samples of the idle board then take ten seconds.
 const INTERVAL_MAX: Duration = Duration::from_secs(2);
 /// Time between two samples of sensors that do not say it.
 const INTERVAL: Duration = Duration::from_millis(35);

@@ -146,7 +146,7 @@ fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Fail
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let progress = progress_bar(args.step);
     let before = args.step.saturating_sub(1);
-    let taken = pile::approach(&mut scene, &mut opened, &parameters, before, || {
+    let taken = pile::step_to(&mut scene, &mut opened, &parameters, before, || {
         progress.inc(1);
         !interrupt.is_set()
     });

@@ -73,7 +73,7 @@ impl Source {
             let (mut scene, mut opened) =
                 pile::open(args.grid, args.drop, common, &Build::default())?;
             let parameters = StepParameters::default();
-            pile::approach(&mut scene, &mut opened, &parameters, args.steps, || true)?;
+            pile::step_to(&mut scene, &mut opened, &parameters, args.steps, || true)?;
             scene
         };
         let name =

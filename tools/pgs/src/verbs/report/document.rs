@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::place::place;
+use super::place::section_key;
 
 /// The origin of a figure or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,8 +103,8 @@ impl Part {
 
     /// Sorts by the sections of the thesis; within one, figures and rows keep their order.
     pub(super) fn sort(&mut self) {
-        self.figures.sort_by_key(|figure| place(figure.thesis));
-        self.rows.sort_by_key(|row| place(&row.thesis));
+        self.figures.sort_by_key(|figure| section_key(figure.thesis));
+        self.rows.sort_by_key(|row| section_key(&row.thesis));
     }
 }
 

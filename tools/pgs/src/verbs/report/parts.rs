@@ -100,7 +100,7 @@ fn of_all(
 #[cfg(test)]
 mod tests {
     use super::super::document::{Origin, Row};
-    use super::super::place::place;
+    use super::super::place::section_key;
     use super::*;
     use crate::cli;
     use crate::verbs::Verb;
@@ -131,8 +131,8 @@ mod tests {
             let cells = [&row.thesis, &row.subject, &row.recorded, &row.ours];
             assert!(cells.iter().all(|cell| !cell.is_empty()), "{row:?}");
         }
-        let rows = report.part.rows.iter().map(|row| place(&row.thesis));
-        let figures = report.part.figures.iter().map(|figure| place(figure.thesis));
+        let rows = report.part.rows.iter().map(|row| section_key(&row.thesis));
+        let figures = report.part.figures.iter().map(|figure| section_key(figure.thesis));
         assert!(rows.clone().is_sorted() && figures.clone().is_sorted());
         assert!(rows.chain(figures).all(|place| !place.is_empty()));
         let ours = |figure: &str| report.part.rows.iter().filter(|row| row.shown == figure).count();
@@ -151,7 +151,7 @@ mod tests {
 
     /// The rows of a report on steps that are found in the same report again, by the command of each.
     #[test]
-    fn a_row_has_the_figure_that_its_command_prints() {
+    fn rows_of_formats_and_orders_have_the_figures_that_their_commands_print() {
         let command = parsed("pgs report --out unused --quick --grid 3x3x3 --step 35");
         let Verb::Report(args) = &command.verb else { panic!("{command:?}") };
         let common = CommonArgs { board: BoardName::Emulated, ..command.common.clone() };

@@ -2,7 +2,7 @@
 
 /// A key that sorts places of the thesis such as "§4.6.3, Figure 4.10": the numbers of the first section
 /// or chapter.
-pub(super) fn place(thesis: &str) -> Vec<u32> {
+pub(super) fn section_key(thesis: &str) -> Vec<u32> {
     let from = thesis.trim_start_matches(|letter: char| !letter.is_ascii_digit());
     let end = from.find(|letter: char| !letter.is_ascii_digit() && letter != '.');
     from[..end.unwrap_or(from.len())].split('.').map_while(|number| number.parse().ok()).collect()
@@ -35,7 +35,7 @@ mod tests {
             "§5.4.3, §5.4.4",
             "§10.1",
         ];
-        let places: Vec<_> = sorted.iter().map(|thesis| place(thesis)).collect();
+        let places: Vec<_> = sorted.iter().map(|thesis| section_key(thesis)).collect();
         assert!(places.is_sorted(), "{places:?}");
         assert_eq!(places[2], [4, 4, 1]);
     }

@@ -53,7 +53,7 @@ impl Step {
         let (mut scene, mut opened) = pile::open(grid, DROP, common, &Build::default())?;
         let (parameters, before) = (StepParameters::default(), args.step.saturating_sub(1));
         let go_on = || effort.go_on().is_ok();
-        pile::approach(&mut scene, &mut opened, &parameters, before, go_on)?;
+        pile::step_to(&mut scene, &mut opened, &parameters, before, go_on)?;
         effort.go_on()?;
         Ok(Self {
             name: format!("step {} of our pile of {grid} cubes", args.step),

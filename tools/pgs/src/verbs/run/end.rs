@@ -49,7 +49,8 @@ pub(super) fn print_end(
     let cold = course.cold.as_mut().and_then(|cold| cold.end_text(done));
     let Course { done, retries, orders, footprint, .. } = &*course;
     if !course.is_complete(args.steps()) {
-        let cold = if *done == args.steps() { ", and before the last cold one" } else { "" };
+        let cold =
+            if *done == args.steps() { "; the scene beside it lacks the last step" } else { "" };
         writeln!(out, "interrupted after {done} of {} steps{cold}", args.steps())?;
     }
     if let Some(faults) = opened.faults_text() {

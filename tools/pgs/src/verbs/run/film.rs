@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use scene::{Scene, StepClock, interpolate};
 use zynq_pgs::Body;
-use zynq_pgs_view::{NotFinite, Recording};
+use zynq_pgs_view::{Recording, ViewError};
 
 use crate::failure::{Cause, Failure};
 
@@ -14,15 +14,15 @@ const WHOLE: f32 = 1e-3;
 /// When a frame is due.
 #[derive(Debug)]
 pub(super) enum Rhythm {
-    /// After each of so many steps.
+    /// After every N-th step.
     Steps(u32),
     /// In simulated time, between two steps where it falls there.
-    Time(Box<Pictures>),
+    Time(Box<FrameClock>),
 }
 
 /// Frames in simulated time.
 #[derive(Debug)]
-pub(super) struct Pictures {
+pub(super) struct FrameClock {
     clock: StepClock,
     interval: Duration,
     /// Steps before the next frame; the clock has the part of a step after them.
@@ -32,7 +32,7 @@ pub(super) struct Pictures {
 }
 
 impl Rhythm {
-    /// So many frames a simulated second.
+    /// N frames a simulated second.
     pub(super) fn in_time(frames: u16, time_step: f32, scene: &Scene) -> Self {
         // A time step that is none is refused by the first step.
         let time_step = Duration::try_from_secs_f32(time_step).unwrap_or_default();
@@ -40,11 +40,11 @@ impl Rhythm {
         let mut clock = StepClock::new(time_step);
         let steps = clock.advance(interval, u32::MAX);
         let before = scene.bodies().to_vec();
-        Self::Time(Box::new(Pictures { clock, interval, steps, before }))
+        Self::Time(Box::new(FrameClock { clock, interval, steps, before }))
     }
 }
 
-impl Pictures {
+impl FrameClock {
     /// The next frame, if it lies before this number of steps: the steps before it, the part of a step after
     /// them, and its bodies.
     fn next(&mut self, steps: u32, bodies: &[Body]) -> Option<(u32, f32, Vec<Body>)> {
@@ -117,15 +117,20 @@ impl Film {
 
     /// Adds bodies some steps, and a part of one, after the start.
     fn add(&mut self, steps: u32, part: f32, bodies: &[Body]) -> Result<(), Failure> {
-        let passed = f64::from(steps) + f64::from(part);
-        #[allow(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-        let time = (f64::from(self.time_step) * passed) as f32;
+        let time = time_of(f64::from(steps) + f64::from(part), self.time_step);
         self.recording.add(steps, time, bodies).map_err(not_shown)
     }
 }
 
+/// The simulated time after a number of steps, s.
+pub(crate) fn time_of(steps: impl Into<f64>, time_step: f32) -> f32 {
+    #[allow(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+    let time = (f64::from(time_step) * steps.into()) as f32;
+    time
+}
+
 /// A frame that no file shows.
-fn not_shown(error: NotFinite) -> Failure {
+fn not_shown(error: ViewError) -> Failure {
     Failure::new(Cause::Output, error).next("give fewer --steps, or leave out --poses and --view")
 }
 

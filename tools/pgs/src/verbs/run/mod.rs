@@ -4,7 +4,7 @@ mod beside;
 mod end;
 mod energy;
 mod files;
-mod film;
+pub(crate) mod film;
 mod row;
 mod summary;
 
@@ -37,7 +37,7 @@ use crate::output::facts::fact;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
-use crate::traced::{Inside, TracedArgs, Tracing};
+use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -206,8 +206,8 @@ struct Course {
     energy: Option<(String, Value)>,
     /// The poses for the files.
     film: Option<Film>,
-    /// Whether the traced step was reached.
-    inside: Inside,
+    /// Whether the files of the traced step were written.
+    inside: TraceFiles,
 }
 
 impl Course {

@@ -12,7 +12,7 @@ use bitstream_model::estimate::thesis::amdahl;
 use bitstream_model::estimate::thesis::recorded::{ACCELERATED_SHARE, CPU, DESIGNS, GPU};
 use clap::Args;
 use nix::time::{ClockId, clock_gettime};
-use scene::{Grid, Scene, SceneOptions};
+use scene::{Grid, Scene};
 use serde::Serialize;
 use yardstick::Yardstick;
 use zynq_pgs::emulation::Build;
@@ -22,10 +22,10 @@ use super::Session;
 use crate::board;
 use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
-use crate::options::scenes;
 use crate::output::facts::fact;
 use crate::output::milliseconds;
 use crate::output::table::{Column, heading, line};
+use crate::pile;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -106,30 +106,25 @@ pub(crate) struct Gain {
 
 /// Steps the pile, and times each measured step's search and response.
 pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
-    scenes::check_rows(options.grid)?;
     let Options { grid, drop, .. } = *options;
-    let mut scene = Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() })
-        .map_err(Failure::input)?;
-    scene.set_threads(1);
     let build = Build { threads: Some(1), ..Build::default() };
-    let mut opened = board::open(&session.common, &build)?;
+    let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
+    scene.set_threads(1);
     session.watch(&mut opened);
-    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let parameters = StepParameters::default();
     session.expect(u64::from(options.steps) + u64::from(options.runs));
     let mut samples = Vec::new();
-    for step in 0..u64::from(options.steps) + u64::from(options.runs) {
-        if session.is_interrupted() {
+    let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, options.steps, || {
+        session.advance();
+        !session.is_interrupted()
+    })?;
+    for _ in 0..options.runs {
+        goes_on = goes_on && !session.is_interrupted();
+        if !goes_on {
             break;
         }
-        let is_measured = step >= options.steps.into();
-        let shares = if is_measured {
-            let search = spent(|| measured_search(&mut scene))?;
-            Some((search, respond(&scene, &parameters)?))
-        } else {
-            scene.detect();
-            None
-        };
+        let search = spent(|| measured_search(&mut scene))?;
+        let response = respond(&scene, &parameters)?;
         let (bodies, collisions) = scene.parts_mut();
         let report = match opened.accelerator.step(bodies, collisions, &parameters) {
             Ok(report) => report,
@@ -137,14 +132,12 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
             Err(error) => return Err(opened.failure(error)),
         };
         session.advance();
-        if let Some((search, response)) = shares {
-            samples.push(Times {
-                search_ms: milliseconds(search),
-                response_ms: milliseconds(response),
-                driver_ms: milliseconds(driver(&report)),
-                board_ms: milliseconds(report.modelled_time()),
-            });
-        }
+        samples.push(Times {
+            search_ms: milliseconds(search),
+            response_ms: milliseconds(response),
+            driver_ms: milliseconds(driver(&report)),
+            board_ms: milliseconds(report.modelled_time()),
+        });
     }
     session.end();
     let median = Times::median(&samples);

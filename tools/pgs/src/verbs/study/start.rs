@@ -136,7 +136,7 @@ impl<'a> Start<'a> {
     }
 
     /// Takes the steps before the start on the board; false if Ctrl-C ended them.
-    pub(super) fn approach(
+    pub(super) fn step_to(
         &mut self,
         opened: &mut OpenBoard,
         session: &Session,
@@ -146,7 +146,7 @@ impl<'a> Start<'a> {
         }
         session.expect(self.args.from.into());
         let mut scene = self.args.scene.build(&Build::default())?;
-        let taken = pile::approach(&mut scene, opened, &self.parameters, self.args.from, || {
+        let taken = pile::step_to(&mut scene, opened, &self.parameters, self.args.from, || {
             session.advance();
             !session.is_interrupted()
         })?;

@@ -8,12 +8,12 @@ use crate::numbers::number;
 use crate::verbs::study::half::{OfBuild, Outcome};
 use crate::verbs::study::recorded::{HALF_AGAINST_FLOAT, SIXTEEN_BITS, SIXTEEN_BITS_RANGE};
 
-/// What the name of a build means.
+/// The meaning of a build's name.
 fn meaning(build: &str) -> Option<&'static str> {
     Some(match build {
         "half" => "half has binary16 throughout, rounded to nearest",
         "half,thesis16" => {
-            "half,thesis16 has the thesis' own sixteen bits (§4.6.4): the first and the last four bits of \
+            "half,thesis16 has the thesis' own sixteen bits (§4.6.4): the top bit and the four low bits of \
              the exponent, ten of the mantissa by truncation, and no zero; smaller numbers become the \
              smallest"
         }

@@ -81,7 +81,7 @@ fn after_steps(one: &Studied<Outcome>, many: &Studied<Outcome>) -> Result<Figure
             source(&many.outcome),
             match step_of_recorded_share(&many.outcome) {
                 Some(step) =>
-                    format!("step {step} is the first with the thesis' share or less below 1 %"),
+                    format!("in step {step} the share below 1 % first falls to the thesis'"),
                 None => "the share below 1 % stays above the thesis'".to_owned(),
             }
         ),
@@ -125,7 +125,7 @@ fn rows(studied: &Studied<Outcome>) -> Vec<Row> {
         rows.push(row(
             TWO_GPU_RUNS.thesis,
             "figure-4-2",
-            "mean deviation of positions between two random orders, for two executions on the GPU"
+            "mean deviation of positions between two random orders; the thesis compares two executions on the GPU"
                 .to_owned(),
             format!("{low} % to {high} %"),
             match studied.outcome.pairs.len() {

@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::numbers::grouped;
 use crate::options::scenes::DROP;
 use crate::pile;
+use crate::verbs::run::film::time_of;
 use crate::verbs::run::{ITERATIONS, STEPS};
 
 /// Steps from one frame of the playback to the next.
@@ -35,22 +36,22 @@ pub(crate) fn part(effort: &Effort<'_>, common: &CommonArgs) -> Result<Part, Fai
     let mut recording = Recording::new(scene.bodies(), scene.geometries());
     recording.add(0, 0.0, scene.bodies()).map_err(Failure::input)?;
     let mut most = 0;
-    let mut seconds = 0.0;
     for step in 1..=steps {
         effort.go_on()?;
         most = most.max(scene.detect().len());
         let (bodies, collisions) = scene.parts_mut();
         let stepped = opened.accelerator.step(bodies, collisions, &parameters);
         stepped.map_err(|error| opened.failure(error))?;
-        seconds += parameters.time_step;
         if step.is_multiple_of(EVERY) {
-            recording.add(step, seconds, scene.bodies()).map_err(Failure::input)?;
+            let time = time_of(step, parameters.time_step);
+            recording.add(step, time, scene.bodies()).map_err(Failure::input)?;
         }
     }
     let cubes = counted(recording.bodies() as u64, "cube");
     let title = format!("{cubes} falling on the ground");
     let facts = [("scene", format!("{grid} cubes, dropped from {DROP} m, {steps} steps"))];
-    let command = format!("pgs run --grid {grid} --view pile.html --picture pile.svg");
+    let command =
+        format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.svg");
     let figure = Figure {
         id: "figure-4-1",
         thesis: "§4.3, Figure 4.1",

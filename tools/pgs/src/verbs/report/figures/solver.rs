@@ -63,10 +63,10 @@ pub(crate) fn part(effort: &Effort<'_>) -> Result<Part, Failure> {
     Ok(Part { figures, rows })
 }
 
-/// The thesis' stopping rule, without a number that it does not print.
+/// The thesis' stopping rule; its number of passes is inferred.
 fn fixed() -> String {
     let passes = thesis::step().passes();
-    format!("a fixed number of passes that it does not print; {passes} by its cycles (inferred)")
+    format!("a fixed number of passes, not printed; {passes} by its cycles (inferred)")
 }
 
 /// Search and response of a step, percent.
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn the_thesis_stops_after_a_number_that_it_does_not_print() {
         let text = fixed();
-        assert!(text.contains("does not print; 8 by its cycles (inferred)"), "{text}");
+        assert!(text.contains("not printed; 8 by its cycles (inferred)"), "{text}");
         assert!(!text.contains('4'), "{text}");
     }
 

@@ -157,7 +157,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
     let from_folder = options.start.input.is_some();
     let pairs = options.pairs.unwrap_or(if from_folder { PAIRS[0] } else { PAIRS[1] });
     session.expect(u64::from(start.steps) * 2 * (u64::from(pairs) + 1));
-    let mut complete = start.approach(&mut opened, session)?;
+    let mut complete = start.step_to(&mut opened, session)?;
 
     let mut compared = |orders| compare(orders, &start, &mut opened, session);
     let (gpu, whole) = compared([Some(Permutation::Gpu), None])?;

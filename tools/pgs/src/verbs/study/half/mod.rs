@@ -30,8 +30,9 @@ Examples:
 
 The boards start from one state. float is the original; every other build takes the same steps by
 itself, with the collisions as given, and is compared with float as eq. 4.1 of the thesis does.
-Builds are written as for `pgs compare`: half has 16 bits throughout, mixed has collisions of 16 bits
-relative to body A and poses in f32, which is its cure. Unmoved is the share of position components
+Builds are written as for `pgs compare`: half has binary16 throughout; thesis16 is the thesis' own
+sixteen bits, and thesis16-literal its encoder taken literally; mixed, the cure, has collisions of 16
+bits relative to body A and poses in f32. Unmoved is the share of position components
 whose bits, as sent to the board, a step did not change. Energies are kinetic.
 
 The splits are of the sixteen bits of a number into exponent and mantissa (thesis §4.6.4), on the
@@ -143,7 +144,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
     let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
     let mut opened = start.open(&original, &common, session)?;
     session.expect(u64::from(start.steps) * (options.builds.len() as u64 + 1));
-    let mut complete = start.approach(&mut opened, session)?;
+    let mut complete = start.step_to(&mut opened, session)?;
 
     let start = &start;
     let moving = moving(start.bodies(), start.shapes());

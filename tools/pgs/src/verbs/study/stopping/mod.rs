@@ -214,7 +214,7 @@ fn pile(
     let mut scene = pile::build(grid, drop)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     session.expect(steps.into());
-    let taken = pile::approach(&mut scene, opened, &parameters, steps, || {
+    let taken = pile::step_to(&mut scene, opened, &parameters, steps, || {
         session.advance();
         !session.is_interrupted()
     })?;
