@@ -91,11 +91,11 @@ impl Film {
                 self.add(steps, 0.0, scene.bodies())
             }
             Rhythm::Steps(_) => Ok(()),
-            Rhythm::Time(pictures) => {
+            Rhythm::Time(frames) => {
                 let due: Vec<_> =
-                    std::iter::from_fn(|| pictures.next(steps, scene.bodies())).collect();
-                pictures.before.clear();
-                pictures.before.extend_from_slice(scene.bodies());
+                    std::iter::from_fn(|| frames.next(steps, scene.bodies())).collect();
+                frames.before.clear();
+                frames.before.extend_from_slice(scene.bodies());
                 due.into_iter().try_for_each(|(steps, part, bodies)| self.add(steps, part, &bodies))
             }
         }
