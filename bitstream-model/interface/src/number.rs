@@ -24,8 +24,9 @@ pub enum StreamFormat {
     /// exponent whatever they are. Words are read alike.
     ///
     /// A word keeps the top bit and the four low bits of the biased exponent. From 2^-15 up to 2^17
-    /// the words are those of thesis16. A smaller magnitude reads as one from 2^-15 up to 2: 2^-16 as
-    /// 1, zero as 2^-15. A larger one reads as one from 2 up to 2^16, or as overflow (F = 31).
+    /// the format has the words of thesis16. A magnitude below 2^-15 reads as a number from 2^-15 up
+    /// to 2: 2^-16 reads as 1, zero as 2^-15. A magnitude of 2^17 or more reads as a number from 2 up
+    /// to 2^16, or as overflow (F = 31).
     Thesis16Literal = 3,
 }
 

@@ -157,7 +157,7 @@ fn thesis16_taken_literally_gives_other_numbers_at_both_ends() {
     assert_eq!(bits(&found), bits(&mapped(&body, carried(literal))));
     // -3.05e-5 is below 2^-15 and loses a factor of 2^-16.
     assert!(found.linear[2] < -1.9, "{:?}", found.linear);
-    // 60,000 and half a second of 160,000 m/s2 are 140,000, of which 2^16 is lost.
+    // The velocity reaches 140,000 m/s in half a second; its word reads as 140,000 / 2^16.
     let fast = Step { gravity: [0.0, 160_000.0, 0.0], integrate: true, ..scene };
     let [_, y, _] = run(config(&HALF, streams), &fast).bodies[0].linear;
     assert!((2.0..3.0).contains(&y), "{y}");

@@ -183,14 +183,20 @@ fn a_stream_without_room_shows_a_sender_that_waits() {
     assert!(channels[0].port.iter().any(|state| waits(&state.port)));
 }
 
-#[test]
-fn a_step_that_fails_is_recorded_to_its_end() {
+/// A machine that records; a step has failed on it, at beat 17 of the second contact pass on MM2S 2.
+fn failed() -> Machine {
     let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
     let mut machine = Machine::new(config);
     let fault = Fault::new(FaultKind::DmaDecErr).on(2, Direction::Mm2s);
     machine.host.board.inject(fault.in_phase(StepPhase::Contact(2)).when(When::Beat(17)));
     machine.host.board.record();
     machine.step(&small()).expect_err("the fault");
+    machine
+}
+
+#[test]
+fn a_step_that_fails_is_recorded_to_its_end() {
+    let machine = failed();
     let recording = machine.host.board.take_recording().expect("it was recorded");
     let faulty = &recording.channels[2];
     assert_eq!(faulty.core, 2);
@@ -228,12 +234,7 @@ fn assert_packets_have_their_beats(recording: &Recording) {
 
 #[test]
 fn a_step_after_one_that_fails_has_packets_of_its_own() {
-    let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
-    let mut machine = Machine::new(config);
-    let fault = Fault::new(FaultKind::DmaDecErr).on(2, Direction::Mm2s);
-    machine.host.board.inject(fault.in_phase(StepPhase::Contact(2)).when(When::Beat(17)));
-    machine.host.board.record();
-    machine.step(&small()).expect_err("the fault");
+    let mut machine = failed();
     let failed = machine.host.board.counts().cycles;
     machine.recover();
     let recovered = machine.host.board.counts().cycles;

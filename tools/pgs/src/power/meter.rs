@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use super::energy::{Energy, Mean};
 use super::sensors::{SensorError, Sensors, Watts};
 
-/// Samples of the idle board before the first step: as many as this time has, within limits.
+/// Time for the samples of the idle board before the first step; their number has limits.
 const IDLE_TIME: Duration = Duration::from_secs(3);
 const IDLE_SAMPLES: RangeInclusive<u128> = 5..=30;
 

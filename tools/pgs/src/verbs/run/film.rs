@@ -141,7 +141,7 @@ mod tests {
 
     const TIME_STEP: f32 = 1.0 / 60.0;
 
-    /// The frames of five steps in each of which a cube falls by 1 m: steps, time, and the fall.
+    /// Films five steps; a cube falls by 1 m in each. Returns the steps, the time and the fall of every frame.
     fn frames(rhythm: impl Fn(&Scene) -> Rhythm) -> Vec<(u32, f32, f32)> {
         let grid = "1x1x1".parse().expect("a grid");
         let options = SceneOptions { grid, ..SceneOptions::default() };

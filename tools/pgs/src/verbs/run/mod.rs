@@ -211,7 +211,7 @@ struct Course {
 }
 
 impl Course {
-    /// Whether all steps were taken, and those of the scene beside it.
+    /// Whether the scene and its cold twin, if it has one, have taken all steps.
     fn is_complete(&self, steps: u32) -> bool {
         let cold = self.cold.as_ref();
         self.done == steps && cold.is_none_or(|cold| cold.has_taken(steps))
