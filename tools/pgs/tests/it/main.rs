@@ -32,3 +32,4 @@ mod study;
 mod study_more;
 mod threads;
 mod traced;
+mod workflows;
