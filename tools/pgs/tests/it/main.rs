@@ -36,3 +36,4 @@ mod study;
 mod study_more;
 mod threads;
 mod traced;
+mod workflows;
