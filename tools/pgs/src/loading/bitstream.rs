@@ -144,7 +144,7 @@ pub(super) fn judge(request: &Request, bytes: &[u8]) -> Result<Bitstream, LoadEr
     let cut = match end {
         End::Cut { inside: Some(words) } => Some(format!("inside a packet of {words} words")),
         End::Cut { inside: None } => Some("without the command DESYNC".to_owned()),
-        End::Desync | End::Empty if bytes.len() % 4 != 0 => {
+        End::Desync | End::Empty if !bytes.len().is_multiple_of(4) => {
             Some("which is no multiple of 4".to_owned())
         }
         _ => None,
