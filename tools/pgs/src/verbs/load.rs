@@ -13,7 +13,7 @@ use crate::output::SCHEMA;
 use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
-Examples:
+Examples on a board:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
   pgs load --json /lib/firmware/xilinx/zynq-pgs/zynq-pgs.bit.bin
