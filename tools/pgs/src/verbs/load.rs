@@ -15,7 +15,7 @@ use crate::output::SCHEMA;
 use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
-Examples:
+Examples on a board:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
   pgs load --check zynq-pgs.bit.bin --overlay zynq-pgs.dtbo    on any machine
