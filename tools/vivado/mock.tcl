@@ -661,6 +661,8 @@ proc check_parameters {} {
 		set bits [value $processor PSU__${port}__DATA_WIDTH]
 		if {$bits != 128} { refuse "$port has $bits bits; the overlays set the ports to 128" }
 	}
+	set mhz [value $processor PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ]
+	if {$mhz != $::pgs(pl_clock_mhz)} { refuse "pl_clk0 is $mhz MHz, and USR_ACCESS asks for $::pgs(pl_clock_mhz)" }
 	foreach wizard [cells_of clk_wiz] {
 		set wanted [expr {round([value $wizard CLKOUT1_REQUESTED_OUT_FREQ] * 1000)}]
 		if {$wanted != $::expected_khz} { refuse "$wizard makes $wanted kHz, not $::expected_khz" }
