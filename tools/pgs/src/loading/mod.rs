@@ -28,7 +28,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use bitstream_model::interface::address_map::{
-    CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_MEMORY_NODE, UIO_NODE,
+    CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_GUARD_NODE, UIO_MEMORY_NODE, UIO_NODE,
 };
 use zynq_pgs::platform::{UioListing, uio_listing};
 use zynq_pgs::{ManagerChoice, UioNode};
@@ -145,11 +145,11 @@ fn is_ours(node: &UioNode) -> bool {
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
 
-/// Whether a node has registers of the accelerator, by its name or its addresses. The memory does
-/// not count: its node is in the base tree.
+/// Whether a node has registers of the accelerator, by its name or its addresses. Memory and guard do
+/// not count: their nodes are in the base tree.
 fn is_accelerator(node: &UioNode) -> bool {
     let end = CONTROL_BASE + u64::from(CONTROL_BYTES);
     let there = |address: u64| (DMA_BASE..end).contains(&address);
-    (is_ours(node) && node.name != UIO_MEMORY_NODE)
+    (is_ours(node) && ![UIO_MEMORY_NODE, UIO_GUARD_NODE].contains(&node.name.as_str()))
         || node.maps.iter().any(|map| there(map.address))
 }
