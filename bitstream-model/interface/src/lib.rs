@@ -16,3 +16,4 @@ pub mod profile;
 pub mod record;
 pub mod register;
 pub mod stripe;
+pub mod usr_access;

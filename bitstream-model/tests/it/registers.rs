@@ -433,7 +433,7 @@ fn misread_identity_is_impossible_on_a_live_board() {
     assert_eq!(host.control(control::DMA), (40 << 8) | 26);
     assert_eq!(host.control(control::NUMBERS), 0, "f32 throughout");
     for register in control::REGISTERS.iter().filter(|register| {
-        (control::IDENTIFICATION.offset..=control::NUMBERS.offset).contains(&register.offset)
+        (control::IDENTIFICATION.offset..=control::FENCE_SIZE.offset).contains(&register.offset)
     }) {
         let before = host.control(*register);
         host.set_control(*register, !before);

@@ -18,6 +18,9 @@ use thiserror::Error;
 
 use crate::output::SCHEMA;
 
+/// The exit code of an interrupted command.
+pub(crate) const INTERRUPTED: u8 = 130;
+
 /// The outcome of a command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {
@@ -33,7 +36,7 @@ impl Verdict {
         ExitCode::from(match self {
             Self::Done => 0,
             Self::Differs => 1,
-            Self::Interrupted => 130,
+            Self::Interrupted => INTERRUPTED,
         })
     }
 }

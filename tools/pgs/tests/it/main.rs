@@ -4,6 +4,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../../src/loading/tests/files.rs"]
+#[allow(dead_code, reason = "the tests of the parts use more of it")]
+mod files_to_load;
 
 mod accelerator;
 mod arrays;
@@ -23,6 +26,7 @@ mod load;
 mod model;
 mod order;
 mod paths;
+mod recipes;
 mod results;
 mod run;
 mod saturated;
@@ -32,3 +36,4 @@ mod study;
 mod study_more;
 mod threads;
 mod traced;
+mod workflows;
