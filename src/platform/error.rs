@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 
+use pgs_interface::fence::Fence;
 use thiserror::Error;
 
 /// Why a request to the platform failed.
@@ -36,6 +37,22 @@ pub enum PlatformError {
         bytes: u64,
         /// Width of the cores' addresses, bits.
         address_width: u32,
+    },
+    /// Memory lies outside the segment that the bitstream confines its DMA cores to.
+    #[error(
+        "{bytes} bytes at {address:#x} of the memory {region:?} lie outside the fence {fence} of the \
+         bitstream, where no DMA core reaches them: reserve the memory of the fence in the device \
+         tree, or build the bitstream for this memory with `rtlgen generate --memory`"
+    )]
+    OutsideFence {
+        /// The memory: a UIO node, a u-dma-buf, or a file.
+        region: String,
+        /// Bus address of the buffer, or of the memory as a whole.
+        address: u64,
+        /// Its length, bytes.
+        bytes: u64,
+        /// The fence.
+        fence: Fence,
     },
     /// A range does not lie inside its buffer.
     #[error("{bytes} bytes at offset {offset} do not lie in a buffer of {buffer_bytes} bytes")]

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use pgs_interface::address_map::{U_DMA_BUF, UIO_CONTROL_MAP, UIO_DMA_MAPS, UIO_MEMORY_NODE};
+use pgs_interface::address_map::{
+    U_DMA_BUF, UIO_CONTROL_MAP, UIO_DMA_MAPS, UIO_GUARD_NODE, UIO_MEMORY_NODE,
+};
 
 use crate::platform::linux::dev_mem::{DevMem, DevMemWindows};
 use crate::platform::linux::uio_listing::part_name;
@@ -73,6 +75,7 @@ enum Registers {
 pub(crate) struct HardwarePlatform {
     registers: Registers,
     pool: Pool,
+    system: System,
     started: Instant,
     /// Whether the node turned out to carry no interrupt.
     no_interrupt: AtomicBool,
@@ -123,6 +126,7 @@ impl HardwarePlatform {
         Ok(Self {
             registers,
             pool: Pool::new(region),
+            system: system.clone(),
             started: Instant::now(),
             no_interrupt: AtomicBool::new(false),
         })
@@ -229,6 +233,14 @@ impl Platform for HardwarePlatform {
 
     fn memory(&self) -> &dyn DmaMemorySource {
         &self.pool
+    }
+
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
+        if !uio_listing(&self.system.uio)?.has(UIO_GUARD_NODE) {
+            return Ok(None);
+        }
+        let guard = ReservedMemory::open_in(&self.system, UIO_GUARD_NODE)?;
+        Ok(Some(Box::new(Pool::new(Box::new(guard)))))
     }
 
     fn now(&self) -> Duration {

@@ -56,6 +56,7 @@ const LINE: usize = 64;
 /// An open u-dma-buf.
 #[derive(Debug)]
 pub(crate) struct UDmaBuf {
+    name: String,
     address: u64,
     bytes: u64,
     /// The mapping for buffers.
@@ -153,7 +154,7 @@ impl UDmaBuf {
             Caching::Cached if coherent => (cached()?, None),
             Caching::Cached => (cached()?, Some(Sync::open(&buffer)?)),
         };
-        Ok(Self { address, bytes, data, words, sync })
+        Ok(Self { name: name.to_owned(), address, bytes, data, words, sync })
     }
 }
 
@@ -202,6 +203,10 @@ pub fn try_u_dma_buf(system: &System, name: &str) -> Result<(), PlatformError> {
 }
 
 impl Region for UDmaBuf {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
     fn address(&self) -> u64 {
         self.address
     }

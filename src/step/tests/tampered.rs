@@ -186,6 +186,10 @@ impl RegisterWindow for Wired {
 }
 
 impl DmaMemorySource for Tampered {
+    fn name(&self) -> &str {
+        "tampered"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         self.wires().writes.push((MEMORY, 0));
         self.inner.allocate(beats)
