@@ -181,6 +181,12 @@ pub enum OpenError {
     /// The bitstream is not one for this driver.
     #[error(transparent)]
     Identity(#[from] IdentityError),
+    /// Another bitstream was loaded while the board was opened.
+    #[error(
+        "the capabilities have changed: another bitstream was loaded while the board was opened; \
+         open it again, with nobody loading one"
+    )]
+    OtherBitstream,
     /// A DMA core did not follow.
     #[error(transparent)]
     Core(#[from] DmaError),

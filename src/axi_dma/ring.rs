@@ -125,16 +125,6 @@ impl Ring {
         self.seen = (0, 0);
     }
 
-    /// Forgets every chain: the engine was stopped and will start at [`Self::start`].
-    pub(crate) fn rewind(&mut self) {
-        self.first = 0;
-        self.used = 0;
-        self.seen = (0, 0);
-        for index in 0..self.count {
-            self.words.write(index * WORDS + STATUS, 0);
-        }
-    }
-
     /// Appends a descriptor to the chain.
     pub(crate) fn push(&mut self, descriptor: &Descriptor) {
         assert!(self.used < self.capacity(), "the ring was sized for the chain before it began");
@@ -289,6 +279,18 @@ mod tests {
         }
         // Four descriptors, three a chain: the spare moves one back each time.
         assert_eq!(tails, [0x80, 0x40, 0x00, 0xC0]);
+    }
+
+    #[test]
+    fn a_ring_takes_a_chain_as_long_as_it_was_asked_for() {
+        for (asked, most) in [(0, 1), (1, 1), (3, 3)] {
+            let (mut ring, address) = ring(asked);
+            assert_eq!(ring.capacity(), most);
+            for _ in 0..most {
+                ring.push(&descriptor(address));
+            }
+            assert_eq!(ring.used(), most);
+        }
     }
 
     #[test]

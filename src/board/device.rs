@@ -12,6 +12,7 @@ use super::cancellation::Cancellation;
 use super::outline::Outline;
 use super::plan::{Plan, bytes};
 use super::port::Port;
+use super::root_cause::control_block_reset;
 use super::symptom::Symptom;
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::beat::pack::pool::PackPool;
@@ -90,9 +91,10 @@ impl Device {
     fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
         let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
-        let mut capabilities = identify(&window)?;
+        let identity = identify(&window)?;
         check_given_width(length_width)?;
-        capabilities.length_width = length_width.unwrap_or(capabilities.length_width);
+        let length_width = length_width.unwrap_or(identity.length_width);
+        let capabilities = Capabilities { length_width, ..identity };
         let mut control = Control::new(window);
         let mut cores = connect(&*platform, &capabilities, &counts)?;
         for core in &mut cores {
@@ -102,7 +104,12 @@ impl Device {
         }
         control.reset(&*platform)?;
         drain_interrupt(&*platform)?;
-        Ok(Self::assemble(platform, control, capabilities, counts, cores))
+        let device = Self::assemble(platform, control, capabilities, counts, cores);
+        // Otherwise the capabilities would be of one bitstream, and the fingerprint of another.
+        if identify(device.control.window())? != identity {
+            return Err(OpenError::OtherBitstream);
+        }
+        Ok(device)
     }
 
     /// Builds the device from parts that were reset and checked.
@@ -247,10 +254,11 @@ impl Device {
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
+        let mut starts = false;
         for (channel, port) in self.s2mm.iter_mut().enumerate() {
             port.begin();
             port.queue(bank, 0, bytes(plan.results(channel)), largest)?;
-            port.ensure_running(&*self.platform)?;
+            starts |= port.ensure_running(&*self.platform)?;
         }
         for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let segments = plan.segments(channel);
@@ -265,7 +273,11 @@ impl Device {
                 }
             }
             queue(&segments.poses)?;
-            port.ensure_running(&*self.platform)?;
+            starts |= port.ensure_running(&*self.platform)?;
+        }
+        // Arguments and shapes would be lost. Where no channel starts, a reset has halted one.
+        if starts && !self.control.is_set_up() {
+            return Err(control_block_reset().into());
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let extensions = self.capabilities.extensions;

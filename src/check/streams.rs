@@ -8,7 +8,7 @@ use super::bring_up::chain;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
-use crate::axi_dma::Direction;
+use crate::axi_dma::{Direction, DmaError};
 use crate::beat::unpack::results::sum_of_words;
 use crate::board::BoardKind;
 use crate::error::Error;
@@ -70,6 +70,10 @@ fn step_failed(error: &Error) -> Outcome {
             Fault::NoMemory(error) | Fault::Platform(error) => (
                 chain(error),
                 "give the board memory for DMA that its cores can reach, 1 MiB for this test",
+            ),
+            Fault::LogicReset { .. } | Fault::Core(DmaError::FirstDescriptor { .. }) => (
+                chain(fault),
+                "see that nothing else loads, resets or drives the logic meanwhile, and test again",
             ),
             fault => (
                 chain(fault),

@@ -55,6 +55,7 @@ pub use linux::dev_mem::DevMemWindows;
 pub use linux::fpga::{
     FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
 };
+pub use linux::lock::DeviceLock;
 pub use linux::system::{System, UIO_CLASS, try_node};
 pub use linux::uio::{NodePart, UioMap, UioNode};
 pub use linux::uio_device::UioDevice;

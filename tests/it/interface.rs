@@ -1,7 +1,9 @@
 //! The contract's literal values: offsets, bits, layouts and reset values, typed here a second time
 //! from PG021 and the accelerator's specification.
 
-use zynq_pgs::interface::{address_map, axi_dma, control, descriptor, profile, record, stripe};
+use zynq_pgs::interface::{
+    address_map, axi_dma, control, descriptor, profile, record, stripe, usr_access,
+};
 
 #[test]
 fn regions_stand_where_the_block_design_puts_them() {
@@ -374,5 +376,15 @@ fn the_solver_has_bullets_constants() {
     ];
     for (value, expected) in bits {
         assert_eq!(value.to_bits(), expected, "{value}");
+    }
+}
+
+#[test]
+fn the_word_of_a_bitstream_for_its_loader_has_the_rate_of_the_pl_clock() {
+    assert_eq!(usr_access::PL_CLOCK_MHZ, 100);
+    assert_eq!(usr_access::word(100), 0x5047_0064);
+    assert_eq!(usr_access::pl_clock_mhz(0x5047_0113), Some(275));
+    for other in [0, 0x5047_0000, 0x0064_5047, 0xFFFF_FFFF, 0x5046_0064] {
+        assert_eq!(usr_access::pl_clock_mhz(other), None, "{other:#x}");
     }
 }

@@ -14,7 +14,8 @@ found=$($RUSTC --version | cut -d' ' -f2)
 # Two compilers in one target directory would rebuild everything at each change of them.
 export CARGO_TARGET_DIR=$target_root/aarch64
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
-export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-static -C strip=symbols"
+given_away="-C strip=symbols $(nameless_flags)"
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C target-feature=+crt-static $given_away"
 # QEMU's own choice of CPU has half precision instructions, which the board's has not. There is no
 # -L: with the loader of one C library and the threads of another, a program hangs.
 export PGS_TEST_RUNNER="timeout 900 qemu-aarch64-static -cpu cortex-a53"
@@ -24,6 +25,6 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=$PGS_TEST_RUNNER
 # library, and another C library needs a target directory of its own.
 with_shared_library() {
 	CARGO_TARGET_DIR=$target_root/aarch64-shared \
-		CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C strip=symbols" \
+		CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS=$given_away \
 		CC=aarch64-linux-gnu-gcc CXX=aarch64-linux-gnu-g++ "$@"
 }

@@ -16,12 +16,15 @@ grep -qx "rustup target add $target" README.md || fail "README.md does not show 
 attend timeout 300 rustup target add "$target" || skip "$target cannot be had here"
 build=$(sed -n "s/^\(cargo build --release --target $target\)$/\1/p" README.md | head -n 1)
 [ -n "$build" ] || fail "README.md does not show how to build for $target"
+CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUSTFLAGS=$(nameless_flags)
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUSTFLAGS
 # shellcheck disable=SC2086 # a command and its options
 attend timeout 1800 $build --locked
 binary=$target_root/$target/release/pgs
 file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
 	fail "expected a static aarch64 binary in $binary"
 echo "$binary: $(stat -c %s "$binary") bytes"
+nameless "$binary"
 
 for folder in tests/golden/*/ ${PGS_VECTORS:+"$PGS_VECTORS"/*/}; do
 	[ -e "$folder/params.npy" ] || continue

@@ -62,6 +62,9 @@ for crate in "${crates[@]}"; do
 	for key in description license rust-version keywords categories documentation; do
 		grep -q "^$key = " <<<"$manifest" || fail "$crate: no $key in its Cargo.toml"
 	done
+	for licence in LICENSE-MIT LICENSE-APACHE; do
+		tar -xOf "$package" --wildcards "*/$licence" 2>/dev/null | cmp -s - "$licence" || fail "$crate: no $licence in its package"
+	done
 	cp "$package" "$packages/crates"
 	echo "$(basename "$package"): $bytes bytes"
 done

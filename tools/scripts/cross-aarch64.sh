@@ -29,6 +29,7 @@ file -b "$binary"
 file -b "$binary" | grep -q 'ARM aarch64.*statically linked' ||
 	fail "expected a static aarch64 binary in $binary"
 echo "$binary: $(stat -c %s "$binary") bytes"
+nameless "$binary"
 
 if [ $run_tests = yes ]; then
 	# What computes, what drives and what converts: there another processor could make a difference.

@@ -35,6 +35,11 @@ tree=$(mktemp -d)
 litter+=("$tree")
 chmod 755 "$tree"
 
+# Flags of their own have a target directory of their own.
+export CARGO_TARGET_DIR=$target_root/deb
+CARGO_BUILD_RUSTFLAGS=$(nameless_flags)
+export CARGO_BUILD_RUSTFLAGS
+
 # The tool and the C library; in the cargo features that every build of both has.
 build() {
 	attend timeout 1800 cargo build --release --locked -p pgs -p zynq-pgs-c "$@" ||
@@ -45,12 +50,12 @@ build() {
 pages=$packages/pages
 build --features pgs/pages
 rm -rf "$pages"
-attend "$target_root/release/pgs" generate --out "$pages"
+attend "$CARGO_TARGET_DIR/release/pgs" generate --out "$pages"
 
 stripper="strip"
 if [ "$architecture" = "$native" ]; then
 	build
-	built=$target_root/release
+	built=$CARGO_TARGET_DIR/release
 elif [ "$architecture" = arm64 ]; then
 	# A subshell: the variables are for this compiler alone.
 	(
@@ -74,6 +79,7 @@ put 644 "$built/libzynq_pgs_c.a" "$libraries/libzynq_pgs_c.a"
 $stripper --strip-all --remove-section=.comment --remove-section=.note "$tree/usr/bin/pgs"
 $stripper --strip-unneeded --remove-section=.comment --remove-section=.note "$tree/$libraries/libzynq_pgs_c.so.$abi"
 $stripper --strip-debug --enable-deterministic-archives "$tree/$libraries/libzynq_pgs_c.a"
+nameless "$tree/usr/bin/pgs" "$tree/$libraries"/libzynq_pgs_c.{so,a}
 put 644 tools/capi/include/zynq_pgs.h usr/include/zynq_pgs.h
 mkdir -p "$tree/$libraries/pkgconfig"
 sed "s|@prefix@|/usr|; s|@version@|$version|; s|^libdir=.*|libdir=\${prefix}/lib/$triplet|" \

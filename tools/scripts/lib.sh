@@ -16,6 +16,26 @@ target_root=${CARGO_TARGET_DIR:-$repository/target}
 fail() { echo "error: $*" >&2; exit 1; }
 skip() { echo "skipped: $*" >&2; exit "$SKIPPED"; }
 
+# The compiler's flags that keep the builder's folders out of a program that is given away.
+nameless_flags() {
+	local cargo=${CARGO_HOME:-$HOME/.cargo} sysroot
+	sysroot=$("${RUSTC:-rustc}" --print sysroot)
+	[[ $repository$cargo$sysroot != *[[:space:]]* ]] || fail "cargo takes no flag with a blank: $repository, $cargo, $sysroot"
+	printf -- '--remap-path-prefix=%s=%s ' "$repository" /zynq-pgs "$cargo" /cargo "$sysroot" /rust
+}
+
+# Fails if one of the files has a path of the builder in it.
+nameless() {
+	local file path found
+	for file in "$@"; do
+		for path in "$repository/" "${CARGO_HOME:-$HOME/.cargo}/" "$HOME/."; do
+			found=$(grep -a -o -F -e "$path" "$file" | wc -l)
+			[ "$found" = 0 ] || fail "$file has $found paths of the builder: $path"
+		done
+	done
+	echo "no path of the builder in ${*##*/}"
+}
+
 # What a script leaves neither running nor lying about, whatever ends it.
 declare -A running=()
 litter=()

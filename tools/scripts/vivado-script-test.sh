@@ -103,6 +103,11 @@ script=zcu102.tcl
 	plant "a second clock" $script 's|clocked memory$k aclk|wire processor/pl_clk0 memory$k/aclk; clocked memory$k {}|' \
 		"dma0/M_AXI_MM2S runs on clock/clk_out1, memory0/S01_AXI on processor/pl_clk0"
 	plant "a wrong rate" $script 's/$khz \/ 1000.0/$khz \/ 1001.0/' "not 275000"
+	plant "another PL clock" $script 's/__FREQMHZ $pgs(pl_clock_mhz)/__FREQMHZ 275/' \
+		"pl_clk0 is 275 MHz, and USR_ACCESS asks for 100"
+	plant "no word for the loader" $script '/-fileset constrs_1/d' "USR_ACCESS of the bitstream is ''"
+	plant "the word of another rate" $script 's/USR_ACCESS $pgs(usr_access)/USR_ACCESS $pgs(pl_clock_mhz)/' \
+		"USR_ACCESS of the bitstream is '100', not 0x50470064"
 	plant "a port without its clock" $script 's/PSU__USE__M_AXI_GP1 0/PSU__USE__M_AXI_GP1 1/' \
 		"processor/maxihpm1_fpd_aclk hangs"
 	plant "a module that is missing" $script 's/foreach module $modules/foreach module [lrange $modules 1 end]/' \

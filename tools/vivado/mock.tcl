@@ -436,11 +436,23 @@ proc save_bd_design {} {
 	if {[lindex $::done end] ne "validate_bd_design"} { refuse "the block design is saved before it is valid" }
 }
 proc make_wrapper args { lappend ::done make_wrapper }
+# The word USR_ACCESS, which only a constraint file brings into the run that writes the bitstream.
+proc check_usr_access {} {
+	global files pgs
+	set word {}
+	foreach file [lsearch -all -inline $files *.xdc] {
+		set constraints [open $file]
+		regexp {set_property BITSTREAM.CONFIG.USR_ACCESS (\S+) \[current_design\]} [read $constraints] - word
+		close $constraints
+	}
+	if {$word ne $pgs(usr_access)} { refuse "USR_ACCESS of the bitstream is '$word', not $pgs(usr_access)" }
+}
 proc launch_runs args {
 	global bit_folder
 	lassign [arguments launch_runs $args {-jobs -to_step} {}] options name
 	if {"make_wrapper" ni $::done} { refuse "$name starts before the block design has a wrapper" }
 	if {[dict exists $options -to_step] && [dict get $options -to_step] eq "write_bitstream"} {
+		check_usr_access
 		set bit_folder [file normalize [file join $::scratch pgs.runs $name]]
 		file mkdir $bit_folder
 		close [open [file join $bit_folder pgs_wrapper.bit] w]
@@ -649,6 +661,8 @@ proc check_parameters {} {
 		set bits [value $processor PSU__${port}__DATA_WIDTH]
 		if {$bits != 128} { refuse "$port has $bits bits; the overlays set the ports to 128" }
 	}
+	set mhz [value $processor PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ]
+	if {$mhz != $::pgs(pl_clock_mhz)} { refuse "pl_clk0 is $mhz MHz, and USR_ACCESS asks for $::pgs(pl_clock_mhz)" }
 	foreach wizard [cells_of clk_wiz] {
 		set wanted [expr {round([value $wizard CLKOUT1_REQUESTED_OUT_FREQ] * 1000)}]
 		if {$wanted != $::expected_khz} { refuse "$wizard makes $wanted kHz, not $::expected_khz" }

@@ -13,8 +13,8 @@
 #   pl_ps_irq0[0] <---- interrupts <---- both channels of dma0..dma3, the accelerator
 #   pl_clk0 (100 MHz) -> clock (MMCM) -> everything
 #
-# There is one clock domain and no pin of the board: the clocks' constraints come with the IP, and the design
-# needs no constraint file.
+# There is one clock domain and no pin of the board: the clocks' constraints come with the IP. The one
+# constraint file sets the word of the bitstream that tells its loader the rate of pl_clk0.
 
 # A namespace of its own, because Vivado has commands of many names.
 namespace eval zcu102 {}
@@ -118,6 +118,7 @@ proc zcu102::place {space segment offset range} {
 # The block design
 
 proc zcu102::add_processor {} {
+	global pgs
 	add_ip zynq_ultra_ps_e processor
 	apply_bd_automation -rule xilinx.com:bd_rule:zynq_ultra_ps_e -config {apply_board_preset "1"} \
 		[get_bd_cells processor]
@@ -130,8 +131,9 @@ proc zcu102::add_processor {} {
 		PSU__SAXIGP2__DATA_WIDTH 128 PSU__SAXIGP3__DATA_WIDTH 128
 		PSU__SAXIGP4__DATA_WIDTH 128 PSU__SAXIGP5__DATA_WIDTH 128
 		PSU__USE__IRQ0 1
-		PSU__FPGA_PL0_ENABLE 1 PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ 100
+		PSU__FPGA_PL0_ENABLE 1
 	}
+	configure processor [list PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ $pgs(pl_clock_mhz)]
 }
 
 # The PLLs of the processing system of the board's preset do not make 275 MHz. An MMCM makes the clock from
@@ -240,6 +242,12 @@ proc zcu102::open_project_with {rtl out here} {
 		set_property file_type {Verilog Header} [get_files [file tail $header]]
 	}
 	add_files -norecurse [file join $here pgs_interrupts.v]
+	# `pgs load` holds this word against the overlay.
+	set constraints [file join $out usr_access.xdc]
+	set file [open $constraints w]
+	puts $file "set_property BITSTREAM.CONFIG.USR_ACCESS $pgs(usr_access) \[current_design\]"
+	close $file
+	add_files -fileset constrs_1 -norecurse $constraints
 	update_compile_order -fileset sources_1
 }
 

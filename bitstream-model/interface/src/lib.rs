@@ -15,3 +15,4 @@ pub mod profile;
 pub mod record;
 pub mod register;
 pub mod stripe;
+pub mod usr_access;

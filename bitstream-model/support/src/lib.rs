@@ -18,19 +18,32 @@
     reason = "threads that outlive a call borrow from its caller; registers and SIMD instructions"
 )]
 
+// Here, because everything else depends on this crate: no other error comes before it.
+#[cfg(not(all(target_os = "linux", target_pointer_width = "64")))]
+compile_error!(
+    "zynq-pgs, with its emulated board, is for Linux on 64-bit processors: it reaches boards through the \
+     kernel's UIO and shares memory with them. On another system, build it in a Linux container or \
+     virtual machine."
+);
+
 pub mod chunks;
 pub mod float_env;
 pub mod lanes;
+mod process;
 #[cfg(test)]
 mod tests;
 
 use std::any::Any;
+use std::mem::{self, ManuallyDrop};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
-use std::{fmt, io, mem};
+use std::{fmt, io};
 
 use float_env::standard;
+pub use process::Process;
+#[cfg(any(test, feature = "forked-child"))]
+pub use process::in_forked_child;
 
 /// Says that the path which calls this is seldom taken, as `std::hint::cold_path` does from Rust 1.95 on.
 #[cold]
@@ -106,6 +119,7 @@ impl Shared {
 pub struct Crew {
     shared: Arc<Shared>,
     helpers: Vec<JoinHandle<()>>,
+    process: Process,
     refused: Option<io::Error>,
 }
 
@@ -221,6 +235,11 @@ impl Drop for Leave<'_> {
 
 impl Drop for Crew {
     fn drop(&mut self) {
+        if !self.process.is_this() {
+            // A forked child has no helpers: their end would never come, and the lock may be held.
+            let _ = ManuallyDrop::new(mem::take(&mut self.helpers));
+            return;
+        }
         self.shared.state().end = true;
         self.shared.begun.notify_all();
         for helper in self.helpers.drain(..) {

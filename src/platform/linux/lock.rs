@@ -59,6 +59,24 @@ impl LockedFile {
     }
 }
 
+/// The lock of a device file, held without a use of the device: no other program, and no other part
+/// of this one, opens the device through this driver meanwhile.
+#[derive(Debug)]
+pub struct DeviceLock {
+    _file: LockedFile,
+}
+
+impl DeviceLock {
+    /// Locks a device file.
+    ///
+    /// # Errors
+    /// [`PlatformError::Busy`] if it is locked already; the file cannot be opened to read and
+    /// write.
+    pub fn new(path: &Path) -> Result<Self, PlatformError> {
+        Ok(Self { _file: LockedFile::open(path, nix::libc::O_NONBLOCK)? })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::{BufRead as _, BufReader, Write as _};
@@ -97,6 +115,16 @@ mod tests {
         assert_busy(&path);
         assert_busy(&path);
         drop(first);
+        assert_free(&path);
+    }
+
+    #[test]
+    fn a_lock_without_a_use_keeps_every_user_away() {
+        let (_root, path) = device();
+        let lock = DeviceLock::new(&path).expect("free");
+        assert_busy(&path);
+        DeviceLock::new(&path).expect_err("a second one");
+        drop(lock);
         assert_free(&path);
     }
 

@@ -23,6 +23,11 @@ use crate::platform::{
 pub(crate) struct BusAddress(u64);
 
 impl BusAddress {
+    /// All bits.
+    pub(crate) const fn raw(self) -> u64 {
+        self.0
+    }
+
     /// Bits 31:0.
     #[allow(clippy::cast_possible_truncation, reason = "the other half is high()")]
     pub(crate) const fn low(self) -> u32 {

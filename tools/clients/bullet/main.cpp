@@ -11,7 +11,7 @@ enum Exit { OK = 0, LIMIT = 1, USAGE = 2, SKIPPED = 77 };
 
 const char USAGE_TEXT[] =
     "usage: bullet-client [SCENE...] [--board TEXT] [--iterations N] [--points N] [--reverse N] [--cold] "
-    "[--json] [--list] [--help]\n"
+    "[--deep N] [--ignore-properties] [--json] [--list] [--help]\n"
     "\n"
     "Runs scenes of Bullet on Bullet's own solver and on the board's, and prints both.\n"
     "Without a scene: all but `spread` and `time`.\n"
@@ -21,10 +21,13 @@ const char USAGE_TEXT[] =
     "  --points N        largest number of points of a collision, 1 to 4 (2)\n"
     "  --reverse N       reverse the order of the collisions every N steps, 0 to 1000 (3; 0 is never)\n"
     "  --cold            begin every step with impulses of 0 on the board; Bullet's own solver stays warm\n"
+    "  --deep N          speed of points deeper than the threshold, per cent of that at it, 0 to 100 (36)\n"
+    "  --ignore-properties\n"
+    "                    the board solves contacts without the properties that it lacks (rolling friction ...)\n"
     "  --json            the table as JSON\n"
     "  --list            the scenes\n"
     "\n"
-    "With --iterations, --points, --reverse or --cold the limits are shown and do not count.\n"
+    "With one of the options from --iterations to --ignore-properties the limits are shown and do not count.\n"
     "\n"
     "exit status: 0; 1 a limit does not hold; 2 wrong usage; 77 the board does not open, nothing was run\n";
 
@@ -65,6 +68,10 @@ const std::vector<Scene> &scenes() {
         {"sleeping", "125 cubes come to rest", sleeping, false},
         {"ccd", "a fast ball against a thin wall", ccd, false},
         {"joints", "a chain, which stays Bullet's, beside boxes on the board", joints, false},
+        {"drop", "ten boxes of 2 m and 1 kg fall 19 m, as a tower", drop, false},
+        {"rolling", "a ball with rolling friction and a box on a ramp of 10 degrees", rolling, false},
+        {"soft", "a box of 4 kg on contacts of stiffness 300 and damping 10", soft, false},
+        {"properties", "a ball on the ground, its contact with a property that no board has", properties, false},
         {"masses", "more masses than the table of the board", masses, false},
         {"warm", "1,000 jumbled cubes, a step with the last one's impulses and one without", warmth, false},
         {"spread", "pile and tower, the bodies shifted by at most 1 mm", spread, true},
@@ -90,8 +97,10 @@ int main(int count, char **arguments) {
             json = true;
         } else if (argument == "--cold") {
             settings.solver.warmStart = false;
+        } else if (argument == "--ignore-properties") {
+            settings.solver.ignoreProperties = true;
         } else if (argument == "--board" || argument == "--iterations" || argument == "--points" ||
-                   argument == "--reverse") {
+                   argument == "--reverse" || argument == "--deep") {
             if (!value) return usage(argument + " needs a value");
             i++;
             if (argument == "--board") {
@@ -99,6 +108,11 @@ int main(int count, char **arguments) {
             } else if (argument == "--iterations") {
                 if (!toNumber(value, 1, 255, settings.iterations))
                     return usage("expected 1 to 255 after --iterations, found " + std::string(value));
+            } else if (argument == "--deep") {
+                int share = 0;
+                if (!toNumber(value, 0, 100, share))
+                    return usage("expected 0 to 100 after --deep, found " + std::string(value));
+                settings.solver.deepShare = 0.01f * float(share);
             } else if (argument == "--reverse") {
                 if (!toNumber(value, 0, 1000, settings.solver.reverseEvery))
                     return usage("expected 0 to 1000 after --reverse, found " + std::string(value));

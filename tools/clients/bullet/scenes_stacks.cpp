@@ -6,22 +6,6 @@
 
 namespace {
 
-// Shifts of at most 1 mm, for runs that are nearly equal: some scenes are chaotic. Run 0 has none.
-class Shifts {
-public:
-    explicit Shifts(int run) : m_run(run), m_random(unsigned(run)) {}
-    btVector3 next() {
-        if (m_run == 0) return btVector3(0, 0, 0);
-        const float x = m_shift(m_random);
-        return btVector3(x, 0, m_shift(m_random));
-    }
-
-private:
-    const int m_run;
-    std::mt19937 m_random;
-    std::uniform_real_distribution<float> m_shift{-0.001f, 0.001f};
-};
-
 // A thousand cubes of 1 kg fall from a loose grid.
 std::vector<double> runPile(World &world, int run = 0) {
     world.addGround();

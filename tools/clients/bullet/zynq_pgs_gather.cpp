@@ -46,13 +46,30 @@ void velocitiesWithForces(const btRigidBody &body, const btContactSolverInfo &in
     angular = body.getAngularVelocity() + change;
 }
 
+btScalar distanceOf(const btManifoldPoint &point, const btContactSolverInfo &info) {
+    return point.getDistance() + info.m_linearSlop;
+}
+
+// Bullet takes bodies out of this penetration by their poses, without a velocity.
+bool isDeepPoint(const btManifoldPoint &point, const btContactSolverInfo &info) {
+    const btScalar distance = distanceOf(point, info);
+    return info.m_splitImpulse && distance < 0 && distance <= info.m_splitImpulsePenetrationThreshold;
+}
+
+// The speed that removes the share (ERP) of a point's penetration in a step.
+btScalar recovery(const btManifoldPoint &point, btScalar distance, const btContactSolverInfo &info) {
+    const bool ownErp = point.m_contactPointFlags & BT_CONTACT_FLAG_HAS_CONTACT_ERP;
+    return btMax(-distance, btScalar(0)) * (ownErp ? point.m_contactERP : info.m_erp2) / info.m_timeStep;
+}
+
 // The speed at which a point may close, m/s, which travels as its distance. Below 0 the bodies must part.
 // - A gap closes within the step at most, so that a point ahead of the contact does nothing too early.
-// - Penetration goes by its share (ERP) in a step, as in Bullet.
+// - Penetration goes by its share (ERP) in a step, as in Bullet. That of a deep point goes by the second step,
+//   and here it has `deepShare` of the speed that a point at the threshold has.
 // - A bounce takes the place of that push where it is faster. Bullet adds the two, and a ball then rises
 //   higher than its restitution says.
 float closingSpeed(const btManifoldPoint &point, const btCollisionObject *a, const btCollisionObject *b,
-                   const btContactSolverInfo &info) {
+                   const btContactSolverInfo &info, float deepShare) {
     auto velocity = [&point](const btCollisionObject *object) {
         const btRigidBody *body = moving(object);
         if (!body) return btVector3(0, 0, 0);
@@ -62,11 +79,36 @@ float closingSpeed(const btManifoldPoint &point, const btCollisionObject *a, con
     const btScalar parting = point.m_normalWorldOnB.dot(velocity(a) - velocity(b));
     const bool bounces = parting < -info.m_restitutionVelocityThreshold;
     const btScalar bounce = bounces ? -parting * point.m_combinedRestitution : btScalar(0);
-    const btScalar distance = point.getDistance() + info.m_linearSlop;
+    const btScalar distance = distanceOf(point, info);
     if (distance > 0) return float(distance / info.m_timeStep - bounce);
-    const bool ownErp = point.m_contactPointFlags & BT_CONTACT_FLAG_HAS_CONTACT_ERP;
-    const btScalar erp = ownErp ? point.m_contactERP : info.m_erp2;
-    return -float(btMax(-distance * erp / info.m_timeStep, bounce));
+    const btScalar push = isDeepPoint(point, info)
+                              ? deepShare * recovery(point, info.m_splitImpulsePenetrationThreshold, info)
+                              : recovery(point, distance, info);
+    return -float(btMax(push, bounce));
+}
+
+// The property of a point that no board has, in words; null if it has none.
+const char *propertyOf(const btManifoldPoint &point, const btContactSolverInfo &info) {
+    const int flags = point.m_contactPointFlags;
+    if (point.m_combinedRollingFriction > 0) return "rolling friction";
+    if (point.m_combinedSpinningFriction > 0) return "spinning friction";
+    if (flags & BT_CONTACT_FLAG_FRICTION_ANCHOR) return "friction anchors";
+    if ((flags & BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED) &&
+        (info.m_solverMode & SOLVER_ENABLE_FRICTION_DIRECTION_CACHING) &&
+        (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0))
+        return "surface motion";
+    // CFM or ERP of a point's own take the place of stiffness and damping.
+    const bool own = flags & (BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP);
+    if (!own && (flags & BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING)) return "contact stiffness and damping";
+    const bool ownCfm = flags & BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+    return (ownCfm ? point.m_contactCFM : info.m_globalCfm) > 0 ? "soft contacts (CFM)" : nullptr;
+}
+
+// Whether Bullet's solver has rows for the contacts of the manifold.
+bool responds(const btPersistentManifold &manifold) {
+    auto *a = const_cast<btCollisionObject *>(manifold.getBody0());
+    auto *b = const_cast<btCollisionObject *>(manifold.getBody1());
+    return a->hasContactResponse() && b->hasContactResponse() && (movable(a) || movable(b));
 }
 
 }  // namespace
@@ -80,7 +122,9 @@ void ZynqPgsGather::clearGathered() {
     m_points.clear();
     m_frictions.clear();
     m_impulses.clear();
+    m_pushes.clear();
     m_hasKinematic = false;
+    m_isDeep = false;
 }
 
 void ZynqPgsGather::clear() {
@@ -114,6 +158,29 @@ void ZynqPgsGather::gather(const btContactSolverInfo &info) {
     gather(info);
 }
 
+const char *ZynqPgsGather::property(const btPersistentManifold &manifold, const btContactSolverInfo &info) {
+    const int count = manifold.getNumContacts();
+    if (count == 0 || !responds(manifold)) return nullptr;
+    if (manifold.getBody0()->hasAnisotropicFriction() || manifold.getBody1()->hasAnisotropicFriction())
+        return "anisotropic friction";
+    for (int i = 0; i < count; i++)
+        if (const char *found = propertyOf(manifold.getContactPoint(i), info)) return found;
+    return nullptr;
+}
+
+std::vector<ZynqPgsGather::Push> &ZynqPgsGather::preparePushes(const btContactSolverInfo &info) {
+    for (size_t at = 0; at < m_collisions.size(); at++)
+        for (size_t i = 0; i < m_points[at].size() && m_points[at][i]; i++) {
+            const btManifoldPoint &point = *m_points[at][i];
+            const btScalar distance = distanceOf(point, info);
+            const btScalar gap = btMax(distance, btScalar(0)) / info.m_timeStep;
+            const bool deep = isDeepPoint(point, info);
+            m_collisions[at].contacts[i].distance = float(deep ? -recovery(point, distance, info) : gap);
+        }
+    m_pushes.assign(m_bodies.size(), Push());
+    return m_pushes;
+}
+
 void ZynqPgsGather::reverse() {
     std::reverse(m_collisions.begin(), m_collisions.end());
     std::reverse(m_points.begin(), m_points.end());
@@ -123,7 +190,7 @@ void ZynqPgsGather::reverse() {
 void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactSolverInfo &info) {
     auto *a = const_cast<btCollisionObject *>(manifold->getBody0());
     auto *b = const_cast<btCollisionObject *>(manifold->getBody1());
-    if (!a->hasContactResponse() || !b->hasContactResponse() || (!movable(a) && !movable(b))) return;
+    if (!responds(*manifold)) return;
     const int count = manifold->getNumContacts();
     if (count == 0) return;
 
@@ -147,7 +214,8 @@ void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactS
         zpgs_collision &collision = m_collisions[at];
         zpgs_contact &contact = collision.contacts[collision.count];
         store(contact.point, point.getPositionWorldOnB());
-        contact.distance = closingSpeed(point, a, b, info);
+        contact.distance = closingSpeed(point, a, b, info, m_deepShare);
+        m_isDeep |= isDeepPoint(point, info);
         m_points[at][collision.count] = &point;
         collision.count++;
     }
@@ -225,15 +293,25 @@ uint32_t ZynqPgsGather::shapeOf(btScalar inverseMass, const btVector3 &inverseIn
     return m_shapeIndices[key] = uint32_t(m_shapes.size() - 1);
 }
 
-void ZynqPgsGather::writeVelocities(const btContactSolverInfo &info) {
-    auto write = [](btRigidBody *body, const btVector3 &linear, const btVector3 &angular) {
+void ZynqPgsGather::write(const btContactSolverInfo &info) {
+    auto set = [](btRigidBody *body, const btVector3 &linear, const btVector3 &angular) {
         // The board knows no locked axes.
         body->setLinearVelocity(linear * body->getLinearFactor());
         body->setAngularVelocity(angular * body->getAngularFactor());
     };
     for (size_t i = 0; i < m_bodies.size(); i++)
         if (btRigidBody *body = movable(m_objects[i]))
-            write(body, load(m_bodies[i].linearVelocity), load(m_bodies[i].angularVelocity));
+            set(body, load(m_bodies[i].linearVelocity), load(m_bodies[i].angularVelocity));
+    for (size_t i = 0; i < m_pushes.size(); i++)
+        if (btRigidBody *body = movable(m_objects[i])) {
+            const btVector3 linear = load(m_pushes[i].linear) * body->getLinearFactor();
+            const btVector3 turn = load(m_pushes[i].angular) * body->getAngularFactor();
+            if (linear.isZero() && turn.isZero()) continue;
+            btTransform moved;
+            btTransformUtil::integrateTransform(body->getWorldTransform(), linear,
+                                                turn * info.m_splitImpulseTurnErp, info.m_timeStep, moved);
+            body->setWorldTransform(moved);
+        }
     for (btCollisionObject *object : m_takenBodies) {
         const size_t place = size_t(object->getWorldArrayIndex());
         if (place < m_bodyOfObject.size() && m_bodyOfObject[place] >= 0) continue;
@@ -242,7 +320,7 @@ void ZynqPgsGather::writeVelocities(const btContactSolverInfo &info) {
         // A body in no collision has only its forces.
         btVector3 linear, angular;
         velocitiesWithForces(*body, info, linear, angular);
-        write(body, linear, angular);
+        set(body, linear, angular);
     }
 }
 

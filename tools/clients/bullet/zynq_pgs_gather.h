@@ -17,7 +17,12 @@ public:
         float linearVelocity[3], angularVelocity[3];
         uint32_t shape;
     };
-    explicit ZynqPgsGather(int pointsPerCollision) : m_pointsPerCollision(pointsPerCollision) {}
+    // The speeds of a body that take it out of deep penetration within a time step.
+    struct Push {
+        float linear[3], angular[3];
+    };
+    ZynqPgsGather(int pointsPerCollision, float deepShare)
+        : m_pointsPerCollision(pointsPerCollision), m_deepShare(deepShare) {}
 
     // Forgets the step, but not the shapes.
     void clear();
@@ -25,8 +30,9 @@ public:
     void take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds, int numManifolds);
     // Makes collisions and bodies of everything taken.
     void gather(const btContactSolverInfo &info);
-    // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision.
-    void writeVelocities(const btContactSolverInfo &info);
+    // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision. Moves
+    // the bodies by their pushes, if preparePushes was called.
+    void write(const btContactSolverInfo &info);
     // Puts the collisions in reverse order.
     void reverse();
     // Makes impulses() from the impulses in Bullet's points, times `factor`; without friction where Bullet's
@@ -34,6 +40,11 @@ public:
     void loadImpulses(float factor, bool withFriction);
     // Stores impulses() in Bullet's points.
     void storeImpulses();
+    // Makes the distances of collisions() those of the second step: deep points push, others resist and may close
+    // a gap. The pushes, one for each of bodies(), are 0 before that step.
+    std::vector<Push> &preparePushes(const btContactSolverInfo &info);
+    // A property of a contact of the manifold that no board has, in words; null if there is none.
+    static const char *property(const btPersistentManifold &manifold, const btContactSolverInfo &info);
 
     // The bodies and manifolds taken.
     std::vector<btCollisionObject *> &takenBodies() { return m_takenBodies; }
@@ -44,6 +55,8 @@ public:
     std::vector<zpgs_collision> &collisions() { return m_collisions; }
     const std::vector<float> &frictions() const { return m_frictions; }  // parallel to collisions()
     std::vector<zpgs_impulses> &impulses() { return m_impulses; }        // parallel to collisions()
+    // True if a point is so deep that its push is one of the pose, not of the velocity.
+    bool isDeep() const { return m_isDeep; }
     // True if a kinematic body in a collision moves.
     bool hasKinematic() const { return m_hasKinematic; }
     const std::vector<zpgs_shape> &shapes() const { return m_shapes; }
@@ -64,6 +77,7 @@ private:
     using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
 
     const int m_pointsPerCollision;
+    const float m_deepShare;
     std::vector<btCollisionObject *> m_takenBodies;
     std::vector<btPersistentManifold *> m_takenManifolds;
 
@@ -74,7 +88,9 @@ private:
     std::vector<Points> m_points;
     std::vector<float> m_frictions;
     std::vector<zpgs_impulses> m_impulses;
+    std::vector<Push> m_pushes;  // parallel to m_bodies, or empty
     bool m_hasKinematic = false;
+    bool m_isDeep = false;
 
     // The table stays from step to step, so that the board seldom gets a new one.
     std::vector<zpgs_shape> m_shapes;

@@ -6,6 +6,9 @@
 
 namespace {
 
+// The most passes of a kind that a step takes.
+const uint32_t MOST_PASSES = 255;
+
 int islandOf(const btCollisionObject *a, const btCollisionObject *b) {
     return a->getIslandTag() >= 0 ? a->getIslandTag() : b->getIslandTag();
 }
@@ -16,7 +19,7 @@ zpgs_strided column(float *field) { return {field, sizeof(ZynqPgsGather::Body)};
 }  // namespace
 
 ZynqPgsSolver::ZynqPgsSolver(const char *board, const ZynqPgsOptions &options)
-    : m_boardText(board), m_options(options), m_gather(options.pointsPerCollision) {
+    : m_boardText(board), m_options(options), m_gather(options.pointsPerCollision, options.deepShare) {
     open();
 }
 
@@ -40,27 +43,35 @@ btScalar ZynqPgsSolver::solveGroup(btCollisionObject **bodies, int numBodies,
                                    const btContactSolverInfo &info, btIDebugDraw *debugDrawer,
                                    btDispatcher *dispatcher) {
     m_dispatcher = dispatcher;
-    if (numConstraints == 0) {
+    // A group may hold several islands. Those with a joint are Bullet's, and those with a contact that a board
+    // cannot solve as Bullet does.
+    std::set<int> bullets;
+    for (int i = 0; i < numConstraints; i++)
+        bullets.insert(islandOf(&constraints[i]->getRigidBodyA(), &constraints[i]->getRigidBodyB()));
+    for (int i = 0; i < numManifolds && !m_options.ignoreProperties; i++) {
+        const char *property = ZynqPgsGather::property(*manifolds[i], info);
+        if (!property) continue;
+        const int island = islandOf(manifolds[i]->getBody0(), manifolds[i]->getBody1());
+        m_counts.propertyIslands += bullets.insert(island).second;
+        if (m_saidProperties.insert(property).second)
+            std::fprintf(stderr, "zynq-pgs: no board has %s: Bullet's own solver takes islands with it\n",
+                         property);
+    }
+    if (bullets.empty()) {
         m_gather.take(bodies, numBodies, manifolds, numManifolds);
         return 0;
     }
-    // A group may hold islands with joints and islands without; only the former are Bullet's.
-    std::vector<int> jointed;
-    for (int i = 0; i < numConstraints; i++)
-        jointed.push_back(islandOf(&constraints[i]->getRigidBodyA(), &constraints[i]->getRigidBodyB()));
-    std::sort(jointed.begin(), jointed.end());
-    auto hasJoint = [&jointed](int island) {
-        return std::binary_search(jointed.begin(), jointed.end(), island);
-    };
     std::vector<btCollisionObject *> ownBodies;
     std::vector<btPersistentManifold *> ownManifolds;
-    for (int i = 0; i < numBodies; i++)
-        (hasJoint(bodies[i]->getIslandTag()) ? ownBodies : m_gather.takenBodies()).push_back(bodies[i]);
-    for (int i = 0; i < numManifolds; i++) {
-        const int island = islandOf(manifolds[i]->getBody0(), manifolds[i]->getBody1());
-        (hasJoint(island) ? ownManifolds : m_gather.takenManifolds()).push_back(manifolds[i]);
+    for (int i = 0; i < numBodies; i++) {
+        const bool own = bullets.count(bodies[i]->getIslandTag()) > 0;
+        (own ? ownBodies : m_gather.takenBodies()).push_back(bodies[i]);
     }
-    m_counts.jointGroups++;
+    for (int i = 0; i < numManifolds; i++) {
+        const bool own = bullets.count(islandOf(manifolds[i]->getBody0(), manifolds[i]->getBody1())) > 0;
+        (own ? ownManifolds : m_gather.takenManifolds()).push_back(manifolds[i]);
+    }
+    m_counts.jointGroups += numConstraints > 0;
     return btSequentialImpulseConstraintSolver::solveGroup(
         ownBodies.data(), int(ownBodies.size()), ownManifolds.data(), int(ownManifolds.size()), constraints,
         numConstraints, info, debugDrawer, dispatcher);
@@ -70,7 +81,7 @@ void ZynqPgsSolver::allSolved(const btContactSolverInfo &info, btIDebugDraw *deb
     if (m_gather.takenBodies().empty()) return;
     m_gather.gather(info);
     if (m_gather.collisions().empty() || stepBoard(info))
-        m_gather.writeVelocities(info);
+        m_gather.write(info);
     else
         fallBack(info, debugDrawer);
     m_gather.clear();
@@ -158,9 +169,16 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
         impulses.assign(pairs.size(), zpgs_impulses());
     else if (status == ZPGS_STATUS_OK)
         status = zpgs_read_impulses(m_board, {impulses.data(), sizeof impulses[0]}, impulses.size());
+    zpgs_report pushReport = {};
+    pushReport.size = sizeof pushReport;
+    const bool pushes = m_gather.isDeep();
+    if (pushes && status == ZPGS_STATUS_OK)
+        status = push(info, bodies, collisions, parameters, pushReport);
     m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
     if (failed(status)) return false;
     m_counts.boardSteps++;
+    m_counts.pushSteps += pushes;
+    m_counts.pushReport = pushReport;
     m_counts.warmSteps += parameters.warm_start;
     m_counts.bodies = all.size();
     m_counts.collisions = pairs.size();
@@ -200,6 +218,24 @@ zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions
         return cold;
     }
     return status;
+}
+
+// The second step of one with deep points: the bodies, at rest, get the speeds that take them apart in this
+// time step. Impulses, friction and the velocities of kinematic bodies have no part in it.
+zpgs_status ZynqPgsSolver::push(const btContactSolverInfo &info, zpgs_bodies bodies,
+                                zpgs_collisions collisions, zpgs_parameters parameters, zpgs_report &report) {
+    std::vector<ZynqPgsGather::Push> &pushes = m_gather.preparePushes(info);
+    bodies.linear_velocities = {pushes[0].linear, sizeof pushes[0]};
+    bodies.angular_velocities = {pushes[0].angular, sizeof pushes[0]};
+    collisions.impulses = {};
+    // It takes as many passes as the first, all of contact.
+    parameters.contact_iterations = std::min(parameters.contact_iterations + parameters.friction_iterations,
+                                             MOST_PASSES);
+    parameters.friction_iterations = 0;
+    parameters.kinematic = 0;
+    parameters.warm_start = 0;
+    parameters.impulses_out = 0;
+    return zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
 }
 
 void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {

@@ -4,14 +4,16 @@
 //     btDiscreteDynamicsWorld world(&dispatcher, &broadphase, &solver, &configuration);
 //
 // The solver gathers the islands of a step and solves them all in one step of the board. Forces, gyroscopic
-// terms, continuous detection, sleeping and the integration stay Bullet's. An island with a joint goes to
-// Bullet's own solver, from which this class derives, and so does a whole step that the board cannot take.
+// terms, continuous detection, sleeping and the integration stay Bullet's. An island with a joint, or with a
+// contact that a board cannot solve as Bullet does, goes to Bullet's own solver, from which this class derives,
+// and so does a whole step that the board cannot take.
 #pragma once
 
 #include <btBulletDynamicsCommon.h>
 #include <zynq_pgs.h>
 
 #include <cstdint>
+#include <set>
 #include <string>
 
 #include "zynq_pgs_gather.h"
@@ -34,6 +36,13 @@ struct ZynqPgsOptions {
     // (SOLVER_USE_WARMSTARTING, which is Bullet's default), and stores its own in Bullet's points. Costs a
     // pass of each kind. A board without impulses does without.
     bool warmStart = true;
+    // The board solves islands, too, whose contacts have a property that no board has (rolling friction and
+    // others, ZynqPgsGather::property), and leaves the property out.
+    bool ignoreProperties = false;
+    // With m_splitImpulse a point deeper than the threshold has this share of the speed that a point at the
+    // threshold has, and the rest is a second step's, which moves the poses. 0 is Bullet's own rule, with which
+    // piles of few passes sink; 0.36 is as much as gravity gives in a step of 1/60 s.
+    float deepShare = 0.36f;
     // Repetitions of a step that failed on the board, before Bullet's solver takes it.
     uint32_t retries = 1;
 };
@@ -46,11 +55,17 @@ struct ZynqPgsCounts {
     uint64_t warmSteps = 0;
     // Groups of islands with joints, which are Bullet's without a fault.
     uint64_t jointGroups = 0;
+    // Islands without a joint that are Bullet's because a contact has a property that no board has. Over all
+    // steps.
+    uint64_t propertyIslands = 0;
+    // Steps on the board with a second one, which takes bodies out of deep penetration (m_splitImpulse).
+    uint64_t pushSteps = 0;
     // Of the last step on the board.
     size_t bodies = 0;
     size_t collisions = 0;
     size_t points = 0;
     zpgs_report report = {};
+    zpgs_report pushReport = {};  // of its second step; zeros if it had none
     // Processor time in the library, s: the packing and the waiting, or the emulation. Over all steps.
     double librarySeconds = 0.0;
 };
@@ -83,6 +98,8 @@ private:
     void loadImpulses(const btContactSolverInfo &info, zpgs_parameters &parameters);
     zpgs_status step(zpgs_bodies &bodies, zpgs_collisions &collisions, zpgs_parameters &parameters,
                      zpgs_report &report);
+    zpgs_status push(const btContactSolverInfo &info, zpgs_bodies bodies, zpgs_collisions collisions,
+                     zpgs_parameters parameters, zpgs_report &report);
     void fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer);
     bool failed(zpgs_status status);
     void say(const std::string &error);
@@ -104,4 +121,5 @@ private:
     ZynqPgsCounts m_counts;
     std::string m_lastError;
     bool m_saidError = false;
+    std::set<std::string> m_saidProperties;
 };

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use zynq_pgs::PlatformError;
 
-use super::format::Advice;
+use super::chip::Chip;
+use super::progress::Stage;
 
 /// The party at fault when loading fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,9 +26,32 @@ pub(crate) enum LoadError {
     #[error("cannot read {}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{}: expected a bitstream (.bit.bin), found {found}", path.display())]
-    Bitstream { path: PathBuf, found: &'static str, advice: Advice },
+    Bitstream { path: PathBuf, found: String, next: String },
+    #[error("{}: expected a bitstream for {part}, found one for {found}", path.display())]
+    OtherChip { path: PathBuf, found: Chip, part: Chip },
+    #[error("{}: the bitstream breaks off after {bytes} bytes, {how}", path.display())]
+    CutOff { path: PathBuf, bytes: usize, how: String },
+    #[error("{}: the bitstream cannot be judged: {reason}", path.display())]
+    Unjudged { path: PathBuf, reason: String },
+    /// Loaded all the same, but is no good answer to a check.
+    #[error(
+        "{}: the bitstream cannot be judged: nothing but zeros follows its sync word",
+        path.display()
+    )]
+    Empty { path: PathBuf },
     #[error("{}: expected a compiled overlay (.dtbo), found {found}", path.display())]
     Overlay { path: PathBuf, found: String },
+    #[error(
+        "{}: the overlay has the kernel load {firmware:?} (its firmware-name), and the bitstream \
+         given is {given:?}", path.display()
+    )]
+    OwnFirmware { path: PathBuf, firmware: String, given: String },
+    #[error(
+        "{}: the overlay sets the PL clock 0 to {sets_hz} Hz, and the bitstream asks for {wanted} \
+         MHz (its USR_ACCESS): at another rate the logic miscalculates or hangs the processor",
+        path.display()
+    )]
+    OtherClock { path: PathBuf, sets_hz: u32, wanted: u32 },
     #[error("{name:?} below the firmware folder cannot be given to the kernel: {reason}")]
     Name { name: String, reason: &'static str },
     #[error("loading needs an FPGA manager, and --manager none names none")]
@@ -43,6 +67,10 @@ pub(crate) enum LoadError {
     NoFlags { manager: String, directory: PathBuf },
     #[error("{device} is open in {users}: DMA cores may be running")]
     InUse { device: String, users: String },
+    #[error(
+        "{device} is locked by a program that does not show in /proc here: DMA cores may be running"
+    )]
+    Locked { device: String },
     #[error(
         "other overlays are there, whose drivers may be bound to the logic: {}",
         listed(overlays)
@@ -78,6 +106,15 @@ pub(crate) enum LoadError {
     NotApplied { status: String, source: Option<io::Error> },
     #[error("the bitstream is loaded and the overlay applied, but there is no UIO node \"pgs\"")]
     NoNode,
+    #[error("interrupted: {}", match stage {
+        Stage::Untouched => "the kernel was given no bitstream, and the logic is as it was",
+        Stage::Programming => {
+            "the kernel was loading the bitstream: the logic may be empty, half programmed, or \
+             running"
+        }
+        Stage::Programmed => "the bitstream is loaded; an overlay may be applied or not",
+    })]
+    Interrupted { stage: Stage },
 }
 
 /// Lists overlays with their status.
@@ -94,8 +131,9 @@ impl LoadError {
         Self::Unreadable { path: path.to_owned(), source }
     }
 
-    pub(super) fn bitstream(path: &Path, found: &'static str, advice: Advice) -> Self {
-        Self::Bitstream { path: path.to_owned(), found, advice }
+    pub(super) fn own_firmware(path: &Path, firmware: &str, given: &str) -> Self {
+        let (firmware, given) = (firmware.to_owned(), given.to_owned());
+        Self::OwnFirmware { path: path.to_owned(), firmware, given }
     }
 
     pub(super) fn attribute(path: &Path, source: io::Error) -> Self {
@@ -107,7 +145,13 @@ impl LoadError {
         match self {
             Self::Unreadable { .. }
             | Self::Bitstream { .. }
+            | Self::OtherChip { .. }
+            | Self::CutOff { .. }
+            | Self::Unjudged { .. }
+            | Self::Empty { .. }
             | Self::Overlay { .. }
+            | Self::OwnFirmware { .. }
+            | Self::OtherClock { .. }
             | Self::Name { .. }
             | Self::Unasked => AtFault::Caller,
             Self::Refused { source, .. } if source.kind() == io::ErrorKind::NotFound => {
@@ -122,9 +166,39 @@ impl LoadError {
     pub(crate) fn next(&self) -> String {
         match self {
             Self::Unreadable { path, source } => unreadable(path, source),
-            Self::Bitstream { path, advice, .. } => advice.text(path),
+            Self::Bitstream { next, .. } => next.clone(),
+            Self::OtherChip { .. } => "build the design for this chip; or name the board's chip \
+                                       with --part, if it is another"
+                .to_owned(),
+            Self::CutOff { .. } => "copy the file again, and compare its length with the \
+                                    original's; or load it as it is with --unjudged"
+                .to_owned(),
+            Self::Unjudged { reason, .. } if reason.contains("encrypted") => {
+                "load it by fpgautil -f, which passes the key's kind on; or as it is with \
+                 --unjudged"
+                    .to_owned()
+            }
+            Self::Unjudged { .. } | Self::Empty { .. } => {
+                "if it is for this chip, load it as it is with --unjudged; otherwise see \
+                 device-tree/README.md for how the files are made"
+                    .to_owned()
+            }
+            Self::OwnFirmware { firmware, .. } => format!(
+                "give an overlay without a firmware-name, as zynq-pgs.dtbo; or let this one load \
+                 the bitstream, from /lib/firmware/{firmware}: fpgautil -b FILE -o OVERLAY"
+            ),
+            Self::OtherClock { wanted, .. } => format!(
+                "give the overlay of this bitstream: assigned-clock-rates = <{wanted}000000> in \
+                 device-tree/zynq-pgs-fabric.dtsi, built again; or load both as they are with \
+                 --unjudged"
+            ),
             Self::Overlay { found, .. } if found.contains("source") => {
                 "compile it: dtc -@ -I dts -O dtb -o x.dtbo x.dtso".to_owned()
+            }
+            Self::Overlay { found, .. } if found.contains("without a node") => {
+                "give the overlay of this bitstream (device-tree/README.md); or apply it all the \
+                 same with --unjudged"
+                    .to_owned()
             }
             Self::Overlay { .. } => {
                 "give the file that dtc -@ made; see device-tree/README.md".to_owned()
@@ -143,6 +217,10 @@ impl LoadError {
             }
             Self::NoFlags { .. } => "load a full bitstream, without --partial".to_owned(),
             Self::InUse { .. } => "stop them, then run the command again".to_owned(),
+            Self::Locked { device } => {
+                let file = device.split(' ').next().unwrap_or_default();
+                format!("stop it, in its container or as `fuser {file}` names it on the host")
+            }
             Self::OtherOverlays { overlays } => {
                 let paths = overlays.iter().map(|(path, _)| path.display().to_string());
                 format!(
@@ -191,6 +269,13 @@ impl LoadError {
                 "look into dmesg; was the base tree compiled with -@ (are gic and zynqmp_clk in \
                  /proc/device-tree/__symbols__)?"
                     .to_owned()
+            }
+            Self::Interrupted { stage: Stage::Untouched } => "run the command again".to_owned(),
+            Self::Interrupted { stage: Stage::Programming } => {
+                "touch no register: load the bitstream again".to_owned()
+            }
+            Self::Interrupted { stage: Stage::Programmed } => {
+                "see `pgs list` for the node of an overlay".to_owned()
             }
             Self::NoNode => "is uio_pdrv_genirq there, and uio_pdrv_genirq.of_id=generic-uio on \
                              the kernel's command line? See `pgs list`"

@@ -1,9 +1,10 @@
 //! Puts a bitstream where the kernel looks for firmware.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::LoadError;
+use super::progress::Progress;
 use super::system::{System, read};
 
 /// The folder that the kernel searches last.
@@ -17,13 +18,20 @@ const NAME_BYTES_MAX: usize = 254;
 #[derive(Debug)]
 pub(super) struct Firmware {
     name: String,
-    copy: Option<PathBuf>,
+    is_copy: bool,
+    progress: Progress,
 }
 
 impl Firmware {
     /// Names the file if it lies below a firmware folder; otherwise copies it to the folder
     /// searched first.
-    pub(super) fn provide(system: &dyn System, bitstream: &Path) -> Result<Self, LoadError> {
+    pub(super) fn provide(
+        system: &dyn System,
+        bitstream: &Path,
+        bytes: &[u8],
+        progress: &Progress,
+    ) -> Result<Self, LoadError> {
+        let progress = progress.clone();
         let first = read(&system.path(FIRST_FOLDER)).unwrap_or_default();
         let first = Some(first.trim_start_matches('/')).filter(|path| !path.is_empty());
         let folders: Vec<_> =
@@ -37,17 +45,21 @@ impl Firmware {
             let Some(name) = name else { continue };
             // A file of the same name in a folder searched earlier hides this one.
             if !folders[..place].iter().any(|before| before.join(name).exists()) {
-                return Ok(Self { name: kernel_name(name)?, copy: None });
+                return Ok(Self { name: kernel_name(name)?, is_copy: false, progress });
             }
         }
         let name = format!("pgs-load-{}.bit.bin", std::process::id());
         let folder = &folders[0];
         let copy = folder.join(&name);
-        let bytes = fs::metadata(&real).map_or(0, |meta| meta.len());
-        let error = |source| LoadError::Copy { path: copy.clone(), bytes, source };
+        let length = bytes.len() as u64;
+        let error = |source| LoadError::Copy { path: copy.clone(), bytes: length, source };
         fs::create_dir_all(folder).map_err(error)?;
-        system.copy(&real, &copy).map_err(error)?;
-        Ok(Self { name, copy: Some(copy) })
+        progress.keep(&copy);
+        if let Err(source) = system.create(&copy, bytes) {
+            progress.forget();
+            return Err(error(source));
+        }
+        Ok(Self { name, is_copy: true, progress })
     }
 
     /// The name for the manager.
@@ -56,16 +68,13 @@ impl Firmware {
     }
 
     pub(super) fn is_copy(&self) -> bool {
-        self.copy.is_some()
+        self.is_copy
     }
 }
 
 impl Drop for Firmware {
     fn drop(&mut self) {
-        let Some(copy) = &self.copy else { return };
-        if let Err(error) = fs::remove_file(copy) {
-            log::warn!("the copy {} stays: {error}", copy.display());
-        }
+        self.progress.remove_copy();
     }
 }
 

@@ -11,6 +11,9 @@ use super::system::{System, read};
 
 /// Devices of the kernel, named by address.
 const DEVICES: &str = "sys/bus/platform/devices";
+/// First letters of drivers whose devices in the logic have no address: XRT's, and drivers that
+/// hand DMA channels to programs.
+const WITHOUT_ADDRESS: [&str; 4] = ["zocl", "dma_proxy", "dma-proxy", "axidma"];
 /// Drivers that hand a device to programs; `users` checks these.
 const UIO_DRIVERS: [&str; 2] = ["uio_pdrv_genirq", "uio_dmem_genirq"];
 
@@ -55,16 +58,26 @@ fn overlays(system: &dyn System) -> Result<Vec<(PathBuf, String)>, LoadError> {
 fn drivers(devices: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(devices) else { return Vec::new() };
     let bound = |path: PathBuf| {
-        // `a0000000.dma` begins with the address of the device's first register.
         let id = path.file_name()?.to_str()?.to_owned();
-        let (address, _) = id.split_once('.')?;
-        let address = u64::from_str_radix(address, 16).ok()?;
-        let link = fs::read_link(path.join("driver")).ok()?;
-        let driver = link.file_name()?.to_str()?;
-        let counts = is_in_logic(address, 1) && !UIO_DRIVERS.contains(&driver);
+        let driver = driver(&path)?;
+        // `a0000000.dma` begins with the address of the device's first register.
+        let address = id.split_once('.').and_then(|(at, _)| u64::from_str_radix(at, 16).ok());
+        let there = address.is_some_and(|address| is_in_logic(address, 1));
+        let counts = there && !UIO_DRIVERS.contains(&driver.as_str()) || is_of_logic(&driver);
         counts.then(|| format!("{driver} to {id}"))
     };
     let mut drivers: Vec<_> = entries.filter_map(|entry| bound(entry.ok()?.path())).collect();
     drivers.sort_unstable();
     drivers
+}
+
+/// The name of a device's driver.
+pub(super) fn driver(device: &Path) -> Option<String> {
+    let link = fs::read_link(device.join("driver")).ok()?;
+    Some(link.file_name()?.to_str()?.to_owned())
+}
+
+/// Whether a driver, or the device file of one, is for the logic by its name.
+pub(super) fn is_of_logic(name: &str) -> bool {
+    WITHOUT_ADDRESS.iter().any(|start| name.starts_with(start))
 }

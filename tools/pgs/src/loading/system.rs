@@ -2,8 +2,13 @@
 
 use std::fmt::Debug;
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read as _, Write};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
+
+use nix::libc::O_NONBLOCK;
+
+use super::LoadError;
 
 /// The files of a Linux system.
 pub(crate) trait System: Debug {
@@ -34,13 +39,12 @@ pub(crate) trait System: Debug {
         fs::remove_dir(path)
     }
 
-    /// Copies a file to a path that does not exist yet.
-    fn copy(&self, from: &Path, to: &Path) -> io::Result<()> {
-        let mut source = fs::File::open(from)?;
-        let mut target = OpenOptions::new().write(true).create_new(true).open(to)?;
-        io::copy(&mut source, &mut target).and_then(|_| target.sync_all()).inspect_err(|_| {
+    /// Writes a file at a path that does not exist yet.
+    fn create(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        file.write_all(bytes).and_then(|()| file.sync_all()).inspect_err(|_| {
             // Half a file is worse than none; the first error is reported.
-            let _ = fs::remove_file(to);
+            let _ = fs::remove_file(path);
         })
     }
 }
@@ -60,4 +64,29 @@ impl System for Linux {
 /// Reads an attribute's text.
 pub(super) fn read(path: &Path) -> io::Result<String> {
     fs::read_to_string(path).map(|text| text.trim().to_owned())
+}
+
+/// Reads a plain file of the caller; otherwise says what it is. A pipe or device is not waited for.
+pub(super) fn read_plain(path: &Path, max: u64) -> Result<Result<Vec<u8>, String>, LoadError> {
+    let unreadable = |source| LoadError::unreadable(path, source);
+    let opened = OpenOptions::new().read(true).custom_flags(O_NONBLOCK).open(path);
+    let file = match opened {
+        // A socket cannot be opened.
+        Err(_) if path.metadata().is_ok_and(|meta| !meta.is_file()) => {
+            return Ok(Err("no plain file".to_owned()));
+        }
+        opened => opened.map_err(unreadable)?,
+    };
+    let meta = file.metadata().map_err(unreadable)?;
+    if !meta.is_file() {
+        return Ok(Err("no plain file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    if meta.len() <= max {
+        file.take(max + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    }
+    match meta.len().max(bytes.len() as u64) {
+        length if length > max => Ok(Err(format!("a file of more than {max} bytes"))),
+        _ => Ok(Ok(bytes)),
+    }
 }

@@ -1,29 +1,33 @@
 //! The verb `load`: loads a bitstream into the logic, and an overlay into the device tree.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::PathBuf;
+use std::process;
 
 use clap::Args;
 use serde_json::{Value, json};
 
 use crate::common::CommonArgs;
-use crate::failure::{Cause, Failure, Verdict};
-use crate::loading::{self, AtFault, Linux, LoadError, Request};
+use crate::failure::{Cause, Failure, INTERRUPTED, Verdict};
+use crate::interrupt;
+use crate::loading::{self, AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use crate::output::SCHEMA;
 use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
-Examples:
+Examples on a board:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
+  pgs load --check zynq-pgs.bit.bin --overlay zynq-pgs.dtbo    on any machine
   pgs load --json /lib/firmware/xilinx/zynq-pgs/zynq-pgs.bit.bin
   pgs load zynq-pgs.bit.bin --manager fpga1    if several FPGA managers may be the ZynqMP's
 
 Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there
-during loading. The command refuses to load while a program has a UIO node of the logic or /dev/mem
-open. Without --replace-others it also refuses while another overlay is applied or a driver is
-bound to the logic. Remove the overlay by rmdir /sys/kernel/config/device-tree/overlays/pgs; see
-device-tree/README.md.";
+during loading. Both files are judged by their content first: the chip, the end of the bitstream,
+the overlay's fragments, firmware-name and PL clock. The command refuses to load while a program has
+a device file of the logic, a u-dma-buf or /dev/mem open or locked. Without --replace-others it also
+refuses while another overlay is applied or a driver is bound to the logic. Remove the overlay by
+rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 
 /// Load a bitstream into the board through the kernel's FPGA manager.
 #[derive(Debug, Clone, Args)]
@@ -37,6 +41,16 @@ pub(crate) struct LoadArgs {
     /// The bitstream is a partial one.
     #[arg(long)]
     partial: bool,
+    /// Judge the files and load nothing. Needs no board.
+    #[arg(long)]
+    check: bool,
+    /// The chip that the bitstream must be for: its name, or its IDCODE as 0x04738093.
+    #[arg(long, value_name = "CHIP", default_value = "XCZU9EG")]
+    part: Chip,
+    /// Load files that cannot be judged, such as encrypted ones, or that are refused for their
+    /// content.
+    #[arg(long)]
+    unjudged: bool,
     /// Load although other overlays or kernel drivers are bound to the logic. They stay bound, and
     /// their behaviour with the new logic is unknown.
     #[arg(long)]
@@ -58,7 +72,7 @@ impl From<LoadError> for Failure {
     }
 }
 
-/// Loads a bitstream.
+/// Loads a bitstream, or judges the files.
 pub(crate) fn run(
     args: &LoadArgs,
     common: &CommonArgs,
@@ -69,42 +83,55 @@ pub(crate) fn run(
         bitstream: args.file.clone(),
         overlay: args.overlay.clone(),
         partial: args.partial,
+        part: args.part,
+        unjudged: args.unjudged,
         manager: common.manager.clone(),
         replace_others: args.replace_others,
     };
-    let loaded = loading::load(&system, &request)?;
-    let kind = if args.partial { "partial" } else { "full" };
+    if args.check {
+        let judged = loading::check(&request)?;
+        if common.json {
+            writeln!(out, "{:#}", document(args, &judged))?;
+        } else {
+            write_judged(args, &judged, out)?;
+            writeln!(out, "checked    nothing was loaded")?;
+        }
+        return Ok(Verdict::Done);
+    }
+
+    let progress = Progress::default();
+    let seen = progress.clone();
+    interrupt::take_over(move || {
+        seen.end(|error| {
+            // With stderr closed, the exit code still tells it.
+            let _ = writeln!(io::stderr(), "{}", Failure::from(error).chain());
+            process::exit(INTERRUPTED.into());
+        });
+    });
+    let loaded = loading::load(&system, &request, &progress)?;
     if common.json {
         let nodes: Vec<Value> = loaded
             .nodes
             .iter()
             .map(|node| json!({ "device": node.device, "name": node.name }))
             .collect();
-        let document = json!({
-            "schema": SCHEMA,
-            "verb": "load",
-            "bitstream": {
-                "file": args.file.display().to_string(),
-                "bytes": loaded.bytes,
-                "kind": kind,
-                "firmware": loaded.firmware,
-                "copied": loaded.copied,
-            },
-            "manager": {
-                "device": loaded.manager,
-                "name": loaded.manager_name,
-                "state_before": loaded.state_before,
-                "state": loaded.state,
-            },
-            "load_ms": milliseconds(loaded.time),
-            "overlay": loaded.overlay,
-            "uio_nodes": nodes,
+        let mut document = document(args, &loaded.judged);
+        document["bitstream"]["firmware"] = loaded.firmware.into();
+        document["bitstream"]["copied"] = loaded.copied.into();
+        document["manager"] = json!({
+            "device": loaded.manager,
+            "name": loaded.manager_name,
+            "state_before": loaded.state_before,
+            "state": loaded.state,
         });
+        document["load_ms"] = json!(milliseconds(loaded.time));
+        document["overlay"] = json!(loaded.overlay);
+        document["uio_nodes"] = nodes.into();
         writeln!(out, "{document:#}")?;
         return Ok(Verdict::Done);
     }
 
-    writeln!(out, "bitstream  {}, {} bytes, {kind}", args.file.display(), loaded.bytes)?;
+    write_judged(args, &loaded.judged, out)?;
     writeln!(
         out,
         "manager    {} ({}): {} -> {}, {:.1} ms",
@@ -124,4 +151,46 @@ pub(crate) fn run(
         writeln!(out, "uio node   none: apply an overlay, see device-tree/README.md")?;
     }
     Ok(Verdict::Done)
+}
+
+const fn kind(args: &LoadArgs) -> &'static str {
+    if args.partial { "partial" } else { "full" }
+}
+
+/// The facts that the files tell, for programs.
+fn document(args: &LoadArgs, judged: &Judged) -> Value {
+    json!({
+        "schema": SCHEMA,
+        "verb": "load",
+        "bitstream": {
+            "file": args.file.display().to_string(),
+            "bytes": judged.bytes(),
+            "kind": kind(args),
+            "chip": judged.chip.map(|chip| chip.to_string()),
+        },
+        "pl_clock": {
+            "bitstream_mhz": judged.wanted_mhz,
+            "overlay_hz": judged.overlay_clock_hz().flatten(),
+        },
+    })
+}
+
+/// The same facts, for people.
+fn write_judged(args: &LoadArgs, judged: &Judged, out: &mut dyn Write) -> io::Result<()> {
+    let (file, bytes) = (args.file.display(), judged.bytes());
+    writeln!(out, "bitstream  {file}, {bytes} bytes, {}", kind(args))?;
+    match judged.chip {
+        Some(chip) => writeln!(out, "chip       {chip}")?,
+        None => writeln!(out, "chip       not known")?,
+    }
+    let wanted = match judged.wanted_mhz {
+        Some(mhz) => format!("the bitstream asks for {mhz} MHz"),
+        None => "the bitstream does not say which rate it asks for (no USR_ACCESS)".to_owned(),
+    };
+    let set = match judged.overlay_clock_hz() {
+        Some(Some(hz)) => format!(", the overlay sets {} MHz", f64::from(hz) / 1e6),
+        Some(None) => ", the overlay sets none".to_owned(),
+        None => String::new(),
+    };
+    writeln!(out, "pl clock   {wanted}{set}")
 }

@@ -4,6 +4,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../../src/loading/tests/files.rs"]
+#[allow(dead_code, reason = "the tests of the parts use more of it")]
+mod files_to_load;
 
 mod accelerator;
 mod arrays;
@@ -14,6 +17,7 @@ mod compare;
 mod detect;
 mod documents;
 mod environment;
+mod examples;
 mod faults;
 mod files;
 mod golden;
@@ -23,6 +27,7 @@ mod load;
 mod model;
 mod order;
 mod paths;
+mod recipes;
 mod results;
 mod run;
 mod saturated;
@@ -32,3 +37,5 @@ mod study;
 mod study_more;
 mod threads;
 mod traced;
+mod width;
+mod workflows;

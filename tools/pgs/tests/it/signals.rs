@@ -20,7 +20,7 @@ fn ignoring(signals: &str, arguments: &[&str]) -> Command {
 
 /// Whether this process, and so every one that it starts, ignores a signal: under `nohup`, or in a
 /// script's background job.
-fn is_ignored(signal: &str) -> bool {
+pub(crate) fn is_ignored(signal: &str) -> bool {
     let number = match signal {
         "-HUP" => 1,
         "-INT" => 2,

@@ -5,6 +5,7 @@ use pgs_interface::address_map::{
     CONTROL_BASE, CONTROL_BYTES, DDR_HIGH, DDR_LOW, DMA_BYTES, INTERRUPT_SPI, dma_base,
 };
 use pgs_interface::profile::FLOAT;
+use pgs_interface::usr_access::{self, PL_CLOCK_MHZ};
 
 use crate::design::Design;
 
@@ -33,6 +34,8 @@ pub(super) fn numbers(design: &Design) -> String {
     set("dma_address_bits", ADDRESS_BITS.to_string());
     set("control_address", hexadecimal(CONTROL_BASE));
     set("control_bytes", hexadecimal(CONTROL_BYTES.into()));
+    set("pl_clock_mhz", PL_CLOCK_MHZ.to_string());
+    set("usr_access", hexadecimal(usr_access::word(PL_CLOCK_MHZ).into()));
     set("interrupt_bit", (INTERRUPT_SPI - PL_PS_IRQ0_SPI).to_string());
     for (name, memory) in [("ddr_low", DDR_LOW), ("ddr_high", DDR_HIGH)] {
         let range = [memory.start, memory.end - memory.start];
@@ -71,6 +74,8 @@ set pgs(dma_length_bits) 26
 set pgs(dma_address_bits) 40
 set pgs(control_address) 0xA0040000
 set pgs(control_bytes) 0x1000
+set pgs(pl_clock_mhz) 100
+set pgs(usr_access) 0x50470064
 set pgs(interrupt_bit) 0
 set pgs(ddr_low) {0x0 0x80000000}
 set pgs(ddr_high) {0x800000000 0x80000000}

@@ -1,6 +1,8 @@
 //! Tests how `load` recognises other users of the logic, whatever their names, and the manager that
 //! programs it.
 
+use zynq_pgs::platform::DeviceLock;
+
 use super::*;
 
 #[test]
@@ -90,7 +92,7 @@ fn logic_under_another_overlay_is_not_replaced_unless_that_is_asked_for() {
         assert!(error.next().contains(&place), "{}", error.next());
         assert!(error.next().contains("--replace-others"), "{}", error.next());
         let request = Request { replace_others: true, ..request(&kernel.installed()) };
-        load(&kernel, &request).expect("asked for");
+        kernel.ask(&request).expect("asked for");
     }
 }
 
@@ -105,11 +107,7 @@ fn an_overlay_whose_status_is_not_known_counts_and_ours_under_another_name_does(
 #[test]
 fn a_driver_of_the_kernel_that_is_bound_to_the_logic_keeps_it() {
     let kernel = FakeKernel::vendor();
-    let bind = |device: &str, driver: &str| {
-        let device = kernel.path(&format!("sys/bus/platform/devices/{device}"));
-        fs::create_dir_all(&device).expect("made");
-        symlink(format!("../../drivers/{driver}"), device.join("driver")).expect("linked");
-    };
+    let bind = |device: &str, driver: &str| bind(&kernel, device, driver);
     bind("ff000000.serial", "xuartps");
     bind("a0000000.pgs", "uio_pdrv_genirq");
     bind("firmware:zynqmp-firmware", "zynqmp_firmware");
@@ -120,7 +118,107 @@ fn a_driver_of_the_kernel_that_is_bound_to_the_logic_keeps_it() {
     let error = kernel.load(&kernel.installed(), false).expect_err("bound");
     assert_refused(&kernel, &error, "xilinx-vdma to a0010000.dma", "--replace-others");
     let request = Request { replace_others: true, ..request(&kernel.installed()) };
-    load(&kernel, &request).expect("asked for");
+    kernel.ask(&request).expect("asked for");
+}
+
+/// Binds a driver to a device without an address.
+fn bind(kernel: &FakeKernel, device: &str, name: &str) {
+    let device = kernel.path(&format!("sys/bus/platform/devices/{device}"));
+    fs::create_dir_all(&device).expect("made");
+    symlink(format!("../../drivers/{name}"), device.join("driver")).expect("linked");
+}
+
+/// Adds a DRM node of a platform device.
+fn add_drm(kernel: &FakeKernel, node: &str, device: &str) {
+    let class = kernel.path(&format!("sys/class/drm/{node}"));
+    fs::create_dir_all(&class).expect("made");
+    let device = kernel.path(&format!("sys/bus/platform/devices/{device}"));
+    symlink(device, class.join("device")).expect("linked");
+}
+
+#[test]
+fn a_driver_for_the_logic_whose_device_has_no_address_keeps_it() {
+    for (device, name) in [
+        ("axi:zyxclmm_drm", "zocl-drm"),
+        ("axi:dma-proxy", "dma_proxy_driver"),
+        ("axidma_chrdev", "axidma"),
+    ] {
+        let kernel = FakeKernel::vendor();
+        bind(&kernel, "axi:pgs-buffer", "u-dma-buf");
+        bind(&kernel, "axi:pgs-clock", "fclk");
+        kernel.load(&kernel.installed(), false).expect("what the overlays of this project bind");
+        kernel.writes.borrow_mut().clear();
+        bind(&kernel, device, name);
+        let error = kernel.load(&kernel.installed(), false).expect_err("bound");
+        assert_refused(&kernel, &error, &format!("{name} to {device}"), "--replace-others");
+    }
+}
+
+#[test]
+fn whoever_has_another_drivers_device_file_of_the_logic_open_uses_it() {
+    for (file, text) in [
+        ("/dev/dri/renderD128", "/dev/dri/renderD128 (zocl)"),
+        ("/dev/dma_proxy_tx", "/dev/dma_proxy_tx"),
+        ("/dev/axidma", "/dev/axidma"),
+        ("/dev/udmabuf0", "/dev/udmabuf0 (u-dma-buf)"),
+        ("/dev/camera", "/dev/camera (u-dma-buf)"),
+    ] {
+        let kernel = FakeKernel::vendor();
+        bind(&kernel, "axi:zyxclmm_drm", "zocl");
+        add_drm(&kernel, "renderD128", "axi:zyxclmm_drm");
+        bind(&kernel, "fd4a0000.display", "zynqmp-dpsub");
+        add_drm(&kernel, "card0", "fd4a0000.display");
+        kernel.file("sys/class/udmabuf/udmabuf0/size", "4096");
+        kernel.file("sys/class/u-dma-buf/camera/size", "4096");
+        for file in ["dma_proxy_tx", "axidma", "udmabuf0", "camera"] {
+            kernel.file(&format!("dev/{file}"), "");
+        }
+        kernel.add_process(17, "desktop", "/dev/dri/card0");
+        // Also where bound drivers are no obstacle.
+        let request = Request { replace_others: true, ..request(&kernel.installed()) };
+        kernel.ask(&request).expect("a display of the processing system");
+        kernel.writes.borrow_mut().clear();
+        kernel.add_process(4711, "xrt", file);
+        let error = kernel.ask(&request).expect_err("in use");
+        assert_refused(&kernel, &error, &format!("{text} is open in process 4711 (xrt)"), "stop");
+    }
+}
+
+#[test]
+fn a_locked_device_file_keeps_the_logic_where_no_process_shows() {
+    let kernel = FakeKernel::vendor();
+    kernel.add_region(0, "design", "registers", 0xA000_0000);
+    kernel.add_region(2, "pmon", "registers", 0xFD0B_0000);
+    kernel.add_node(1, "pgs-memory");
+    kernel.file("sys/class/u-dma-buf/pgs/size", "4096");
+    let file = |name: &str| kernel.file(&format!("dev/{name}"), "");
+    for (name, text) in [
+        ("uio0", "/dev/uio0 (\"design\")"),
+        ("uio1", "/dev/uio1 (\"pgs-memory\")"),
+        ("pgs", "/dev/pgs (u-dma-buf)"),
+        ("mem", "/dev/mem"),
+    ] {
+        let held = DeviceLock::new(&file(name)).expect("free");
+        let error = kernel.load(&kernel.installed(), false).expect_err("locked");
+        assert_refused(&kernel, &error, &format!("{text} is locked"), "fuser /dev/");
+        drop(held);
+    }
+    let _foreign = DeviceLock::new(&file("uio2")).expect("free");
+    kernel.load(&kernel.installed(), false).expect("nobody has the logic's");
+}
+
+#[test]
+fn the_locks_are_held_while_the_logic_is_programmed_and_free_afterwards() {
+    let kernel = FakeKernel::vendor();
+    kernel.add_region(0, "design", "registers", 0xA000_0000);
+    let node = kernel.file("dev/uio0", "");
+    kernel.tries.replace(Some(node.clone()));
+    kernel.load(&kernel.installed(), false).expect("loaded");
+    assert_eq!(kernel.tried.get(), Some(false), "a driver was refused meanwhile");
+    kernel.state_after.set("write error");
+    kernel.load(&kernel.installed(), false).expect_err("failed");
+    kernel.try_device();
+    assert_eq!(kernel.tried.get(), Some(true), "free");
 }
 
 /// Adds the manager `fpga<number>`.
@@ -153,16 +251,16 @@ fn the_bitstream_goes_to_the_logics_own_manager_by_its_name() {
     );
     let to = |manager| Request { manager, ..request(&kernel.installed()) };
     let named = to(ManagerChoice::Device("fpga0".to_owned()));
-    assert_eq!(load(&kernel, &named).expect("named").manager, "fpga0");
+    assert_eq!(kernel.ask(&named).expect("named").manager, "fpga0");
     kernel.writes.borrow_mut().clear();
 
     add_manager(&kernel, 0, "Xilinx Versal FPGA Manager");
     add_manager(&kernel, 1, OTHER);
     let error = kernel.load(&kernel.installed(), false).expect_err("none of them");
     assert_refused(&kernel, &error, "no FPGA manager is named \"Xilinx ZynqMP", "pgs list");
-    let error = load(&kernel, &to(ManagerChoice::Device("fpga7".to_owned()))).expect_err("absent");
+    let error = kernel.ask(&to(ManagerChoice::Device("fpga7".to_owned()))).expect_err("absent");
     assert_refused(&kernel, &error, "no FPGA manager \"fpga7\" (found: fpga0", "pgs list");
-    let error = load(&kernel, &to(ManagerChoice::Unasked)).expect_err("none");
+    let error = kernel.ask(&to(ManagerChoice::Unasked)).expect_err("none");
     assert_eq!(error.at_fault(), AtFault::Caller);
     assert_eq!(kernel.written(), []);
 }

@@ -19,7 +19,7 @@ fn an_installed_bitstream_is_loaded_by_its_name_and_the_overlay_follows() {
     let firmware = "sys/class/fpga_manager/fpga0/firmware";
     assert_eq!(written[1], pair(firmware, "xilinx/zynq-pgs.bit.bin"));
     assert_eq!(written[2].0, format!("{OVERLAYS}/pgs/dtbo"));
-    assert_eq!(kernel.writes.borrow()[2].1, TREE);
+    assert_eq!(kernel.writes.borrow()[2].1, tree());
     assert_eq!(written.len(), 3);
 }
 
@@ -44,7 +44,7 @@ fn a_bitstream_from_elsewhere_is_copied_while_it_is_loaded() {
 fn a_firmware_folder_behind_a_link_is_the_firmware_folder() {
     let kernel = FakeKernel::vendor();
     kernel.remove("lib");
-    let file = kernel.bytes("usr/lib/firmware/zynq-pgs.bit.bin", BITSTREAM);
+    let file = kernel.bytes("usr/lib/firmware/zynq-pgs.bit.bin", &bitstream());
     symlink("usr/lib", kernel.path("lib")).expect("linked");
     let loaded = kernel.load(&file, false).expect("loaded");
     assert_eq!((loaded.firmware.as_str(), loaded.copied), ("zynq-pgs.bit.bin", false));
@@ -54,12 +54,12 @@ fn a_firmware_folder_behind_a_link_is_the_firmware_folder() {
 fn a_partial_bitstream_sets_the_flag_or_is_refused_without_one() {
     let kernel = FakeKernel::vendor();
     let partial = |kernel: &FakeKernel| Request { partial: true, ..request(&kernel.installed()) };
-    load(&kernel, &partial(&kernel)).expect("loaded");
+    kernel.ask(&partial(&kernel)).expect("loaded");
     assert_eq!(kernel.written()[0], pair("sys/class/fpga_manager/fpga0/flags", "1"));
 
     let kernel = FakeKernel::vendor();
     kernel.remove("sys/class/fpga_manager/fpga0/flags");
-    let error = load(&kernel, &partial(&kernel)).expect_err("refused");
+    let error = kernel.ask(&partial(&kernel)).expect_err("refused");
     assert_refused(&kernel, &error, "no file \"flags\"", "without --partial");
     kernel.load(&kernel.installed(), false).expect("a full one needs no flags");
 }
@@ -101,13 +101,13 @@ fn an_overlay_that_the_kernel_drops_is_removed_and_said() {
 fn the_folder_that_the_kernel_looks_into_first_is_a_firmware_folder() {
     let kernel = FakeKernel::vendor();
     kernel.file("sys/module/firmware_class/parameters/path", "/data/firmware");
-    let file = kernel.bytes("data/firmware/zynq-pgs.bit.bin", BITSTREAM);
+    let file = kernel.bytes("data/firmware/zynq-pgs.bit.bin", &bitstream());
     let loaded = kernel.load(&file, false).expect("loaded");
     assert_eq!((loaded.firmware.as_str(), loaded.copied), ("zynq-pgs.bit.bin", false));
     let loaded = kernel.load(&kernel.elsewhere(), false).expect("loaded");
     assert!(loaded.copied, "into that folder, where the kernel finds it");
     // The kernel would load another file of the same name.
-    let hidden = kernel.bytes("lib/firmware/zynq-pgs.bit.bin", BITSTREAM);
+    let hidden = kernel.bytes("lib/firmware/zynq-pgs.bit.bin", &bitstream());
     kernel.bytes("data/firmware/zynq-pgs.bit.bin", b"another");
     assert!(kernel.load(&hidden, false).expect("loaded").copied);
 }

@@ -1,6 +1,8 @@
 //! Tests loading on a kernel made of files, which reacts to writes as the vendor's does.
 
 mod bound;
+pub(super) mod files;
+mod judged;
 mod loads;
 mod refusals;
 
@@ -11,21 +13,29 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
+use zynq_pgs::platform::DeviceLock;
 
 use super::*;
 
-/// A short bitstream in bootgen's format.
-const BITSTREAM: &[u8] = b"\xff\xff\xff\xff\x66\x55\x99\xaa a bitstream";
-/// A compiled device tree of sixteen bytes.
-const TREE: &[u8] = b"\xd0\x0d\xfe\xed\0\0\0\x10the rest";
+/// A bitstream that asks for 100 MHz, and an overlay that sets them.
+fn bitstream() -> Vec<u8> {
+    files::bitstream(Some(100))
+}
+
+fn tree() -> Vec<u8> {
+    files::overlay(Some(100_000_000), None)
+}
+
 const OVERLAYS: &str = "sys/kernel/config/device-tree/overlays";
 
 /// Loads a bitstream alone.
-fn request(bitstream: &Path) -> Request {
+pub(super) fn request(bitstream: &Path) -> Request {
     Request {
         bitstream: bitstream.to_owned(),
         overlay: None,
         partial: false,
+        part: Chip::of(0x0473_8093),
+        unjudged: false,
         manager: ManagerChoice::Automatic,
         replace_others: false,
     }
@@ -40,11 +50,17 @@ struct FakeKernel {
     /// The state after programming; if it is an error, the write fails, too.
     state_after: Cell<&'static str>,
     status_after: Cell<&'static str>,
+    /// The bitstream that it loads.
+    expected: RefCell<Vec<u8>>,
     denied: Cell<&'static str>,
     /// Whether a UIO driver binds to the overlay's node.
     binds: Cell<bool>,
     /// A device that a program opens while the bitstream is copied.
     opened_meanwhile: Cell<Option<&'static str>>,
+    /// A device file that a driver tries to lock while the logic is programmed.
+    tries: RefCell<Option<PathBuf>>,
+    /// Whether it could.
+    tried: Cell<Option<bool>>,
 }
 
 impl FakeKernel {
@@ -55,9 +71,12 @@ impl FakeKernel {
             writes: RefCell::default(),
             state_after: Cell::new(OPERATING),
             status_after: Cell::new("applied"),
+            expected: RefCell::new(bitstream()),
             denied: Cell::new("nothing"),
             binds: Cell::new(true),
             opened_meanwhile: Cell::default(),
+            tries: RefCell::default(),
+            tried: Cell::default(),
         };
         for (file, text) in
             [("name", "Xilinx ZynqMP FPGA Manager"), ("state", "unknown"), ("flags", "0")]
@@ -83,7 +102,7 @@ impl FakeKernel {
 
     /// A bitstream outside the firmware folder.
     fn elsewhere(&self) -> PathBuf {
-        self.bytes("home/zynq-pgs.bit.bin", BITSTREAM)
+        self.bytes("home/zynq-pgs.bit.bin", &bitstream())
     }
 
     fn remove(&self, path: &str) {
@@ -115,15 +134,26 @@ impl FakeKernel {
         symlink(open, files.join("7")).expect("linked");
     }
 
+    fn ask(&self, request: &Request) -> Result<Loaded, LoadError> {
+        load(self, request, &Progress::default())
+    }
+
     /// Loads a bitstream, with or without an overlay.
     fn load(&self, bitstream: &Path, overlay: bool) -> Result<Loaded, LoadError> {
-        let tree = self.bytes("home/zynq-pgs.dtbo", TREE);
-        load(self, &Request { overlay: overlay.then_some(tree), ..request(bitstream) })
+        let tree = self.bytes("home/zynq-pgs.dtbo", &tree());
+        self.ask(&Request { overlay: overlay.then_some(tree), ..request(bitstream) })
     }
 
     /// A bitstream in the firmware folder.
     fn installed(&self) -> PathBuf {
-        self.bytes("lib/firmware/xilinx/zynq-pgs.bit.bin", BITSTREAM)
+        self.bytes("lib/firmware/xilinx/zynq-pgs.bit.bin", &bitstream())
+    }
+
+    /// Starts a driver, which tries to lock the device file.
+    fn try_device(&self) {
+        if let Some(device) = &*self.tries.borrow() {
+            self.tried.set(Some(DeviceLock::new(device).is_ok()));
+        }
     }
 
     fn written(&self) -> Vec<(String, String)> {
@@ -150,6 +180,7 @@ impl System for FakeKernel {
         let below = path.strip_prefix(self.root.path()).expect("below the root");
         self.writes.borrow_mut().push((below.display().to_string(), bytes.to_owned()));
         if path.ends_with("firmware") {
+            self.try_device();
             let name = std::str::from_utf8(bytes).expect("a name");
             let first = self.path("sys/module/firmware_class/parameters/path");
             let first = fs::read_to_string(first).unwrap_or_default();
@@ -157,7 +188,7 @@ impl System for FakeKernel {
                 .map(|folder| self.path(folder.trim_start_matches('/')));
             let firmware = folders.into_iter().map(|folder| folder.join(name));
             let found = firmware.into_iter().find_map(|file| fs::read(file).ok());
-            let found = found.is_some_and(|bytes| bytes == BITSTREAM);
+            let found = found.is_some_and(|bytes| bytes == self.expected.borrow().as_slice());
             let state = if found { self.state_after.get() } else { "firmware request error" };
             self.file("sys/class/fpga_manager/fpga0/state", state);
             if state.ends_with("error") {
@@ -185,12 +216,12 @@ impl System for FakeKernel {
         fs::remove_dir_all(path)
     }
 
-    fn copy(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.allow(to.parent().expect("a folder"))?;
+    fn create(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        self.allow(path.parent().expect("a folder"))?;
         if let Some(device) = self.opened_meanwhile.get() {
             self.add_process(4712, "late", device);
         }
-        Linux { root: PathBuf::new() }.copy(from, to)
+        Linux { root: PathBuf::new() }.create(path, bytes)
     }
 }
 

@@ -134,8 +134,7 @@ fn a_kernel_without_overlays_is_refused_before_the_bitstream_is_touched() {
 #[test]
 fn files_of_another_kind_are_wrong_input() {
     let kernel = FakeKernel::vendor();
-    let tree = kernel.path("tree.dtbo");
-    fs::write(&tree, TREE).expect("written");
+    let tree = kernel.bytes("tree.dtbo", &tree());
     let program = kernel.path("program");
     fs::write(&program, b"\x7fELF").expect("written");
     let empty = kernel.path("empty");
@@ -153,7 +152,7 @@ fn files_of_another_kind_are_wrong_input() {
     }
     let overlay = Some(kernel.file("zynq-pgs.dtso", "/dts-v1/;"));
     let request = Request { overlay, ..request(&kernel.installed()) };
-    let error = load(&kernel, &request).expect_err("a source");
+    let error = kernel.ask(&request).expect_err("a source");
     assert_eq!(error.at_fault(), AtFault::Caller, "{error}");
     assert!(error.next().contains("dtc -@"), "{}", error.next());
     assert_eq!(kernel.written(), []);
@@ -178,9 +177,14 @@ fn what_the_kernel_would_misread_is_refused_before_anything_is_written() {
             assert!(error.next().contains(next), "{}", error.next());
         }
     }
-    let cut = kernel.bytes("home/cut.dtbo", &TREE[..12]);
+    let whole = tree();
+    let cut = kernel.bytes("home/cut.dtbo", &whole[..12]);
     let request = Request { overlay: Some(cut), ..request(&kernel.installed()) };
-    let error = load(&kernel, &request).expect_err("cut off");
-    assert!(error.to_string().contains("the first 12 bytes of one of 16"), "{error}");
+    let error = kernel.ask(&request).expect_err("cut off");
+    let length = whole.len();
+    assert!(
+        error.to_string().contains(&format!("the first 12 bytes of one of {length}")),
+        "{error}"
+    );
     assert_eq!(kernel.written(), []);
 }
