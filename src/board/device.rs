@@ -201,6 +201,7 @@ impl Device {
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
                 if !port.ring_takes(descriptors) {
+                    self.platform.reach()?;
                     port.stop(&*self.platform)?;
                     port.replace_ring(&self.platform, descriptors, reach)?;
                 }
@@ -249,6 +250,8 @@ impl Device {
     ) -> Result<(), Symptom> {
         let largest = self.largest;
         let outline = Outline::new(plan, largest);
+        // Comes before the step's first register.
+        self.platform.reach()?;
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
@@ -384,6 +387,10 @@ impl Drop for Device {
     /// memory.
     fn drop(&mut self) {
         if self.dead {
+            return;
+        }
+        if let Err(error) = self.platform.reach() {
+            self.give_up(&error.into());
             return;
         }
         if self.in_flight() {

@@ -146,6 +146,20 @@ pub enum PlatformError {
         /// Which file.
         path: PathBuf,
     },
+    /// A plain file lies in the place of a device file.
+    #[error(
+        "{} is a plain file of {found} bytes, expected a device with at least {expected}: remove it, \
+         and let udev make the device file (udevadm trigger)",
+        path.display()
+    )]
+    NotADevice {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of the device's regions.
+        expected: u64,
+        /// Bytes of the file.
+        found: u64,
+    },
     /// The programmable logic is not programmed, or the kernel does not know that it is.
     #[error(
         "no bitstream is loaded as far as the kernel knows: expected \"operating\" in {}, found \
@@ -196,6 +210,15 @@ pub enum PlatformError {
         node: String,
         /// The kernel's name for it.
         device: String,
+    },
+    /// The kernel took the logic away while it was open.
+    #[error(
+        "{why} while it was open: no register is touched any more; load the bitstream and its overlay \
+         again if need be, then open the board again"
+    )]
+    Lost {
+        /// The part that went away, in words.
+        why: String,
     },
     /// An access does not lie in its region.
     #[error(

@@ -56,7 +56,7 @@ pub use linux::fpga::{
     FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
 };
 pub use linux::lock::DeviceLock;
-pub use linux::system::{System, UIO_CLASS, try_device};
+pub use linux::system::{System, UIO_CLASS, try_node};
 pub use linux::uio::{NodePart, UioMap, UioNode};
 pub use linux::uio_device::UioDevice;
 pub use linux::uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
@@ -107,8 +107,13 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     /// Lets the interrupt through again.
     fn unmask_interrupt(&self) -> Result<(), PlatformError>;
 
-    /// Why the board cannot be reached any more, if its registers read all ones because of that.
+    /// Why the board cannot be reached any more. Its registers are then not touched, and read all
+    /// ones.
     fn lost(&self) -> Option<PlatformError> {
         None
+    }
+    /// Makes sure that the registers may still be touched.
+    fn reach(&self) -> Result<(), PlatformError> {
+        self.lost().map_or(Ok(()), Err)
     }
 }
