@@ -79,7 +79,7 @@ fn expect_lost(what: &str, found: Result<(), PlatformError>) -> Result<(), Strin
     }
 }
 
-/// A node with an interrupt: whoever waits wakes up, and every later call says that it is lost.
+/// A node with an interrupt: a wait ends at once, and every later call says that the node is lost.
 pub(crate) fn with_interrupt() -> Outcome {
     let device = UioDevice::open(UIO_NODE)?;
     let window = device.window(UIO_CONTROL_MAP)?;
@@ -103,7 +103,7 @@ pub(crate) fn with_interrupt() -> Outcome {
     expect_lost("another wait", device.wait_interrupt(LIMIT).map(|_| ()))?;
     expect_lost("unmasking", device.unmask())?;
     expect_lost("the question", device.check())?;
-    // What makes it dangerous.
+    // The danger: an access would still reach them.
     let bytes = window.bytes();
     Ok(format!("the wait ended after {took:?}; {bytes} bytes of registers are mapped still"))
 }
