@@ -91,12 +91,12 @@ type Lost = Arc<OnceLock<String>>;
 /// A register region that is not touched once the board is lost: an access to logic without a clock
 /// hangs the processor.
 #[derive(Debug)]
-struct Guarded {
+struct UnlessLost {
     registers: Box<dyn RegisterWindow>,
     lost: Lost,
 }
 
-impl RegisterWindow for Guarded {
+impl RegisterWindow for UnlessLost {
     fn bytes(&self) -> u64 {
         self.registers.bytes()
     }
@@ -154,10 +154,15 @@ impl HardwarePlatform {
             (_, None) => open_memory(system, memory)?,
         };
         log::info!("memory for DMA: {} bytes at {:#x}", region.bytes(), region.address());
-        Ok(Self::assemble(registers, region, logic))
+        Ok(Self::assemble(system, registers, region, logic))
     }
 
-    fn assemble(registers: Registers, region: Box<dyn Region>, logic: LogicState) -> Self {
+    fn assemble(
+        system: &System,
+        registers: Registers,
+        region: Box<dyn Region>,
+        logic: LogicState,
+    ) -> Self {
         Self {
             registers,
             pool: Pool::new(region),
@@ -293,7 +298,7 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
 impl Platform for HardwarePlatform {
     fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
         let registers = self.registers_of(map)?;
-        Ok(Box::new(Guarded { registers, lost: Arc::clone(&self.lost) }))
+        Ok(Box::new(UnlessLost { registers, lost: Arc::clone(&self.lost) }))
     }
 
     fn memory(&self) -> &dyn DmaMemorySource {
@@ -392,7 +397,7 @@ mod tests {
         };
         let (_, memory) = reserved(0x6000_0000, 1 << 16);
         let logic = LogicState::open(system, manager).expect("it runs");
-        HardwarePlatform::assemble(registers, Box::new(memory), logic)
+        HardwarePlatform::assemble(system, registers, Box::new(memory), logic)
     }
 
     /// The device with the interrupt.
