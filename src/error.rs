@@ -181,10 +181,10 @@ pub enum OpenError {
     /// The bitstream is not one for this driver.
     #[error(transparent)]
     Identity(#[from] IdentityError),
-    /// Another bitstream was loaded while the board was opened.
+    /// The capabilities changed while the board was opened.
     #[error(
-        "the capabilities have changed: another bitstream was loaded while the board was opened; \
-         open it again, with nobody loading one"
+        "the capabilities have changed while the board was opened: was another bitstream loaded, or \
+         the power lost? open it again, with nobody loading one"
     )]
     OtherBitstream,
     /// A DMA core did not follow.

@@ -68,6 +68,7 @@ impl PlantedRegion {
     fn read_dma(state: &State, region: usize, at: u32, mut value: u32) -> u32 {
         let (channel, key, offset) = channel(region, at);
         if offset == DMASR.offset {
+            let failed = value & dmasr::ERRORS != 0;
             match state.trouble {
                 Some(Trouble::Status(troubled, bits)) if troubled == channel && state.opened => {
                     value |= bits;
@@ -78,9 +79,11 @@ impl PlantedRegion {
                 _ => {}
             }
             if let Some(Mistake::StatusUnseen(bits)) = state.mistake {
-                // An error halts the channel, and such a driver does not see that either.
-                let failed = value & bits & dmasr::ERRORS != 0;
-                value &= !(bits | if failed { dmasr::HALTED.mask() } else { 0 });
+                value &= !bits;
+                if failed {
+                    // An error halts the channel, and such a driver does not see that either.
+                    value &= !dmasr::HALTED.mask();
+                }
             }
             if let Some(halted) = state.believed.get(&key) {
                 value = dmasr::HALTED.put(value, u32::from(*halted));

@@ -27,11 +27,12 @@ const TURN: &str = "convert the .bit of the same design by bootgen (device-tree/
 const UNPACK: &str = "unpack {}, and load the .bit.bin in it, or convert its .bit";
 const BOOT_IMAGE: &str = "a boot image is started by the board: copy it to the boot medium; to \
                           load its bitstream from Linux convert the .bit by bootgen with \
-                          -process_bitstream bin. An encrypted or authenticated bitstream is loaded by \
-                          fpgautil -f, which passes the key's kind on, or as it is with --unjudged";
+                          -process_bitstream bin. An encrypted or authenticated bitstream is \
+                          loaded by fpgautil -f, which passes the key's kind on, or as it is with \
+                          --unjudged";
 const OVERLAY: &str = "give the bitstream (.bit.bin) first, and this file by --overlay";
-const FETCH: &str = "fetch the file itself, by `git lfs pull` or once more from where it came from; \
-                     or make it as device-tree/README.md shows";
+const FETCH: &str = "fetch the file itself, by `git lfs pull` or once more from where it came \
+                     from; or make it as device-tree/README.md shows";
 pub(super) const README: &str = "see device-tree/README.md for how the files are made";
 
 /// Formats that are mistaken for bitstreams: offset and bytes of the signature, name, next step.

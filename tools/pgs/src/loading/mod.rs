@@ -3,12 +3,13 @@
 //!
 //! ```text
 //! both files -> FPGA manager -> users, locks -> other overlays and drivers -> ours
-//!            -> firmware file -> users -> fpga_manager -> state? -> overlay -> status? -> UIO node?
+//!            -> firmware file -> users -> fpga_manager -> state?
+//!            -> overlay -> status? -> UIO node?
 //! ```
 //!
 //! The locks of the device files are held until the end: a driver of this project that is started
-//! meanwhile is refused. Another program that opens a node between the second look for users and the
-//! write to the manager goes unnoticed.
+//! meanwhile is refused. Another program that opens a node between the second look for users and
+//! the write to the manager goes unnoticed.
 //!
 //! Source: linux-xlnx, `drivers/fpga/fpga-mgr.c` (attributes `flags`, `firmware`, `state`) and
 //! `drivers/of/configfs.c` (`overlays/<name>/{dtbo,status}`); mainline has neither.
