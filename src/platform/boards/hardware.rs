@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 #[cfg(feature = "emulation")]
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -43,12 +42,6 @@ pub enum MemoryChoice {
     DevMem {
         /// Its physical addresses.
         window: Range<u64>,
-    },
-    /// A file: the memory of a board in another process, if it is not the file beside its socket.
-    #[cfg(feature = "emulation")]
-    File {
-        /// The file.
-        path: PathBuf,
     },
 }
 

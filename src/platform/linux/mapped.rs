@@ -3,6 +3,7 @@
 
 use std::fs::File;
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 
 use memmap2::{MmapOptions, MmapRaw};
@@ -19,7 +20,8 @@ use crate::platform::{PlatformError, RegisterWindow};
 ///
 /// Every access here relies on one invariant: a region has one owner, and under that owner no
 /// access to a word meets a store to the same word from another thread. The lock keeps other
-/// mappings of the device file away, also mappings of this process. The owners do the rest: the
+/// mappings of the device file away, also mappings of this process; a file that came to this process
+/// alone needs none. The owners do the rest: the
 /// public types store through `&mut self`, the accelerator steps through `&mut self`, and the pool
 /// gives each piece of memory to one holder. The device's own accesses are not the language's
 /// concern: words and doublewords are volatile and aligned, and beats are handed over.
@@ -30,7 +32,7 @@ pub(crate) struct Mapping {
     start: usize,
     bytes: usize,
     /// Dropped after the map: the device file is locked as long as it is mapped.
-    _lock: Arc<LockedFile>,
+    _lock: Option<Arc<LockedFile>>,
 }
 
 impl Mapping {
@@ -53,8 +55,29 @@ impl Mapping {
         start: usize,
         bytes: usize,
     ) -> Result<Self, PlatformError> {
-        let path = || lock.path().to_owned();
-        let error = |source| PlatformError::File { act: "map", path: path(), source };
+        let map = Self::map(file, lock.path(), file_offset, start, bytes)?;
+        Ok(Self { _lock: Some(Arc::clone(lock)), ..map })
+    }
+
+    /// Maps the first `bytes` bytes of a file that nobody else in this process has, and that cannot
+    /// get shorter; `path` names it in errors.
+    #[cfg(feature = "emulation")]
+    pub(crate) fn of_private(
+        file: &File,
+        path: &Path,
+        bytes: usize,
+    ) -> Result<Self, PlatformError> {
+        Self::map(file, path, 0, 0, bytes)
+    }
+
+    fn map(
+        file: &File,
+        path: &Path,
+        file_offset: u64,
+        start: usize,
+        bytes: usize,
+    ) -> Result<Self, PlatformError> {
+        let error = |source| PlatformError::File { act: "map", path: path.to_owned(), source };
         let invalid = || {
             let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
             error(io::Error::new(io::ErrorKind::InvalidData, text))
@@ -65,7 +88,7 @@ impl Mapping {
         }
         let map =
             MmapOptions::new().offset(file_offset).len(length).map_raw(file).map_err(error)?;
-        Ok(Self { map, start, bytes, _lock: Arc::clone(lock) })
+        Ok(Self { map, start, bytes, _lock: None })
     }
 
     /// Length of the region.
@@ -197,7 +220,7 @@ mod tests {
         let file = file_of(&[0; 16]);
         let lock = LockedFile::open(file.path(), 0).expect("nobody else has it");
         let map = MmapRaw::from(memmap2::MmapMut::map_anon(start + bytes).expect("mapped"));
-        Mapping { map, start, bytes, _lock: Arc::new(lock) }
+        Mapping { map, start, bytes, _lock: Some(Arc::new(lock)) }
     }
 
     #[test]
