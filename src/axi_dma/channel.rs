@@ -194,7 +194,7 @@ mod tests {
 
     fn address() -> BusAddress {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
-        let words = SharedWords::allocate(&platform, 64, 40).expect("allocated");
+        let words = SharedWords::allocate(&platform, 64, 40.into()).expect("allocated");
         words.range(16, 16).expect("inside")
     }
 

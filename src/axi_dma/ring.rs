@@ -16,7 +16,7 @@ use pgs_interface::descriptor::{CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, co
 
 use super::Direction;
 use super::descriptor::{Descriptor, DescriptorStatus};
-use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
+use crate::platform::{BusAddress, Platform, PlatformError, Reach, SharedWords};
 
 /// How far the engine is with a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,10 +91,10 @@ impl Ring {
         platform: &Arc<dyn Platform>,
         direction: Direction,
         chain: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<Self, PlatformError> {
         let count = chain.max(1) + 1;
-        let words = SharedWords::allocate(platform, count * WORDS, address_width)?;
+        let words = SharedWords::allocate(platform, count * WORDS, reach)?;
         let ring = Self { words, direction, count, first: 0, used: 0, seen: (0, 0) };
         for index in 0..count {
             let next = ring.address_of((index + 1) % count)?;
@@ -246,8 +246,8 @@ mod tests {
 
     fn ring_of(direction: Direction, chain: usize) -> (Ring, BusAddress) {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
-        let ring = Ring::new(&platform, direction, chain, 40).expect("allocated");
-        let buffer = CpuBuffer::allocate(&platform, 16, 40).expect("allocated");
+        let ring = Ring::new(&platform, direction, chain, 40.into()).expect("allocated");
+        let buffer = CpuBuffer::allocate(&platform, 16, 40.into()).expect("allocated");
         let buffer = buffer.into_device(16, Access::Read).expect("handed over");
         (ring, buffer.range(0, 256).expect("inside"))
     }

@@ -61,6 +61,8 @@ impl Device {
             } else {
                 self.check_cancelled()?;
                 self.platform.pause(time);
+                // The line is masked; this tells whether the board is still there.
+                self.platform.wait_interrupt(Duration::ZERO)?;
                 false
             };
             let statuses = self.statuses();

@@ -7,7 +7,7 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 
 use super::anomalies::Anomalies;
 use super::bank::{Bank, PerBank};
-use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
+use super::bring_up::{Core, check_given_width, check_memory, connect, drain_interrupt};
 use super::cancellation::Cancellation;
 use super::outline::Outline;
 use super::plan::{Plan, bytes};
@@ -92,6 +92,7 @@ impl Device {
         let counts = Arc::<AccessCounts>::default();
         let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
         let identity = identify(&window)?;
+        check_memory(&*platform, &identity)?;
         check_given_width(length_width)?;
         let length_width = length_width.unwrap_or(identity.length_width);
         let capabilities = Capabilities { length_width, ..identity };
@@ -156,13 +157,13 @@ impl Device {
     /// Makes the buffers of a bank large enough for a step. No engine works on the bank.
     pub(crate) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
         self.take_back_unused(bank);
-        let width = self.capabilities.address_width;
+        let reach = self.capabilities.reach();
         for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let beats = plan.segments(channel).end();
-            port.reserve_beats(&self.platform, bank, beats, width)?;
+            port.reserve_beats(&self.platform, bank, beats, reach)?;
         }
         for (channel, port) in self.s2mm.iter_mut().enumerate() {
-            port.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
+            port.reserve_beats(&self.platform, bank, plan.results(channel), reach)?;
         }
         Ok(())
     }
@@ -193,15 +194,16 @@ impl Device {
     /// Makes the rings large enough for a step. No step is in flight.
     pub(crate) fn reserve_rings(&mut self, plan: &Plan) -> Result<(), Symptom> {
         self.started = None;
-        let width = self.capabilities.address_width;
+        let reach = self.capabilities.reach();
         for core in 0..self.mm2s.len() {
             let [sent, received] = self.descriptors_of(plan, core);
             for (port, descriptors) in
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
                 if !port.ring_takes(descriptors) {
+                    self.platform.reach()?;
                     port.stop(&*self.platform)?;
-                    port.replace_ring(&self.platform, descriptors, width)?;
+                    port.replace_ring(&self.platform, descriptors, reach)?;
                 }
             }
         }
@@ -221,7 +223,7 @@ impl Device {
     }
 
     /// Descriptors of a step on both channels of a core: MM2S, S2MM.
-    fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
+    pub(super) fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
         let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
         let received = usize::try_from(received).unwrap_or(usize::MAX);
         [plan.descriptors(core, self.largest), received]
@@ -248,6 +250,8 @@ impl Device {
     ) -> Result<(), Symptom> {
         let largest = self.largest;
         let outline = Outline::new(plan, largest);
+        // Comes before the step's first register.
+        self.platform.reach()?;
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
@@ -383,6 +387,10 @@ impl Drop for Device {
     /// memory.
     fn drop(&mut self) {
         if self.dead {
+            return;
+        }
+        if let Err(error) = self.platform.reach() {
+            self.give_up(&error.into());
             return;
         }
         if self.in_flight() {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::bank::{Bank, PerBank};
 use crate::axi_dma::{ChainState, Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
-use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
+use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError, Reach};
 
 use pgs_interface::record::Beat;
 
@@ -41,7 +41,7 @@ impl Port {
         platform: &Arc<dyn Platform>,
         bank: Bank,
         beats: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<(), PlatformError> {
         let held = &mut self.held[bank];
         match held {
@@ -51,7 +51,7 @@ impl Port {
         // The old buffer goes first: memory for DMA is scarce.
         *held = Held::Nobody;
         let slack = (beats + beats / 4).max(1).next_multiple_of(4);
-        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
+        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, reach)?);
         Ok(())
     }
 
@@ -80,12 +80,17 @@ impl Port {
         &mut self,
         platform: &Arc<dyn Platform>,
         descriptors: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<(), PlatformError> {
         self.ring = None;
         let slack = descriptors.saturating_add(descriptors / 4);
-        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, address_width)?);
+        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, reach)?);
         Ok(())
+    }
+
+    /// Frees the ring of a channel that is stopped.
+    pub(crate) fn drop_ring(&mut self) {
+        self.ring = None;
     }
 
     /// Stops the channel if it runs.
@@ -247,7 +252,7 @@ mod tests {
         let mut port = Port::new(channel, Access::Read, Dmacr::RUNNING);
         assert!(!port.ring_takes(1));
         // A quarter is slack.
-        port.replace_ring(&platform, 8, 40).expect("allocated");
+        port.replace_ring(&platform, 8, 40.into()).expect("allocated");
         assert_eq!([9, 10, 11].map(|length| port.ring_takes(length)), [true, true, false]);
     }
 }

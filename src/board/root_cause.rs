@@ -25,6 +25,9 @@ impl Device {
         if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {
             return (Cancelled, None);
         }
+        if let Err(error) = self.platform.reach() {
+            return (error.into(), None);
+        }
         let seen = match symptom {
             Symptom::Status { place, status } => Some((place, status)),
             _ => None,

@@ -5,6 +5,7 @@ use std::time::Duration;
 use pgs_interface::record::Beat;
 
 use super::bring_up::chain;
+use super::fence::fence;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
@@ -46,6 +47,8 @@ pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
     lines.set(Line::Coherency, outcome);
     let outcome = interrupt(&mut accelerator).unwrap_or_else(|outcome| outcome);
     lines.set(Line::Interrupt, outcome);
+    let outcome = fence(&mut accelerator);
+    lines.set(Line::Fence, outcome);
 }
 
 /// A number of bodies for which the bitstream has room, at most `bodies`.
@@ -121,6 +124,7 @@ fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<EchoRe
             short_pieces: *size <= SHORT_PIECES_UP_TO,
             fresh_buffers: true,
             filler: None,
+            guarded: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -204,6 +208,7 @@ fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
             short_pieces: false,
             fresh_buffers: round == 0,
             filler: Some(pattern.filler()),
+            guarded: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -253,8 +258,13 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
         .bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
     let mut woken = 0;
     for _ in 0..INTERRUPT_STEPS {
-        let echo =
-            Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, filler: None };
+        let echo = Echo {
+            bodies: &bodies,
+            fresh_buffers: false,
+            short_pieces: false,
+            filler: None,
+            guarded: None,
+        };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         woken += u64::from(echoed.interrupts > 0);
     }

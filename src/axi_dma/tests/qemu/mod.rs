@@ -65,13 +65,14 @@ impl Core {
     }
 
     fn ring(&self, direction: Direction, chain: usize) -> Ring {
-        Ring::new(&self.platform, direction, chain, ADDRESS_WIDTH).expect("enough memory")
+        Ring::new(&self.platform, direction, chain, ADDRESS_WIDTH.into()).expect("enough memory")
     }
 
     /// A buffer that holds these bytes, with the device.
     fn outgoing(&self, bytes: &[u8]) -> DeviceBuffer {
         let beats = bytes.len().div_ceil(16);
-        let mut buffer = CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH).expect("memory");
+        let mut buffer =
+            CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH.into()).expect("memory");
         let mut padded = bytes.to_vec();
         padded.resize(16 * beats, 0);
         let (words, _) = padded.split_arrays::<4>();
@@ -85,7 +86,8 @@ impl Core {
     /// An empty buffer, with the device.
     fn incoming(&self, bytes: usize) -> DeviceBuffer {
         let beats = bytes.div_ceil(16);
-        let buffer = CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH).expect("memory");
+        let buffer =
+            CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH.into()).expect("memory");
         buffer.into_device(beats, Access::Write).expect("handed over")
     }
 
