@@ -102,7 +102,7 @@ fn at(socket: &Path) -> OpenOptions {
     OpenOptions { board, ..OpenOptions::default() }
 }
 
-/// The driver's memory is 8 MiB at 0x5000_0000.
+/// The driver's memory is 8 MiB at `MEMORY_BASE`.
 #[test]
 fn memory_outside_the_fence_is_refused_by_name_before_a_step() {
     let fence = |text: &str| Some(text.parse::<Fence>().expect("a fence"));
@@ -552,7 +552,8 @@ fn engines_that_a_driver_left_running_go_on_in_its_memory_and_in_no_other() {
     }
     assert!(!served.board.is_running());
     assert!(served.board.counts().beats_written > written, "the step had its memory");
-    let mut found = vec![1; (MEMORY.end - MEMORY.start) as usize];
+    let bytes = usize::try_from(MEMORY.end - MEMORY.start).expect("a few MiB");
+    let mut found = vec![1; bytes];
     memory.read_exact_at(&mut found, 0).expect("read");
     assert!(found.iter().all(|byte| *byte == 0), "the new memory is untouched");
     drop(stream);
