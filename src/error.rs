@@ -158,13 +158,6 @@ pub enum OpenError {
     /// Memory was chosen for an emulated board.
     #[error("an emulated board has memory of its own: leave out the choice of memory")]
     EmulatedMemory,
-    /// A file was chosen as memory of a board that is not in another process, or something else
-    /// for one that is.
-    #[error(
-        "the memory of a served board is a file, and no other board's is: leave out the choice of \
-         memory, or name the file that `pgs serve` names"
-    )]
-    ServedMemory,
     /// A length width that no DMA core can have.
     #[error("the length width must be {low} to {high} bits, found {found}")]
     LengthWidth {

@@ -89,8 +89,7 @@ pub enum BoardChoice {
     #[cfg(feature = "emulation")]
     Emulated(bitstream_model::CpuPort),
     /// An emulated board in another process, served at this Unix socket
-    /// ([`bitstream_model::remote`]). Its memory is [`MemoryChoice::File`], or the file beside the
-    /// socket that `pgs serve` makes.
+    /// ([`bitstream_model::remote`]), which brings its memory.
     #[cfg(feature = "emulation")]
     Served {
         /// The socket.
@@ -157,11 +156,6 @@ pub(crate) fn find(
     let uio = |node: &str, reason| {
         real(RegisterChoice::Uio(node.to_owned()), BoardKind::Uio, node, reason)
     };
-    #[cfg(feature = "emulation")]
-    if matches!(memory, MemoryChoice::File { .. }) && !matches!(choice, BoardChoice::Served { .. })
-    {
-        return Err(OpenError::ServedMemory);
-    }
     match choice {
         BoardChoice::Automatic => {
             let mut listing = uio_listing(&system.uio)?;
@@ -183,7 +177,7 @@ pub(crate) fn find(
             own_memory(memory).map(|()| emulated(port.clone(), "asked for"))
         }
         #[cfg(feature = "emulation")]
-        BoardChoice::Served { socket } => served(socket, memory),
+        BoardChoice::Served { socket } => own_memory(memory).and_then(|()| served(socket)),
     }
 }
 
@@ -227,14 +221,9 @@ fn emulated(port: bitstream_model::CpuPort, reason: &str) -> Found {
 
 /// The board of another process.
 #[cfg(feature = "emulation")]
-fn served(socket: &std::path::Path, memory: &MemoryChoice) -> Result<Found, OpenError> {
-    let memory = match memory {
-        MemoryChoice::Automatic => crate::platform::memory_beside(socket),
-        MemoryChoice::File { path } => path.clone(),
-        _ => return Err(OpenError::ServedMemory),
-    };
+fn served(socket: &std::path::Path) -> Result<Found, OpenError> {
     Ok(Found {
-        platform: Arc::new(crate::platform::RemotePlatform::open(socket, &memory)?),
+        platform: Arc::new(crate::platform::RemotePlatform::open(socket)?),
         description: BoardDescription {
             kind: BoardKind::Served,
             name: socket.display().to_string(),

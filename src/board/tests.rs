@@ -1,6 +1,7 @@
 //! Tests which boards are opened, refused or left alone, on systems made of files.
 
 use std::fs;
+use std::time::Duration;
 
 use super::open::{BoardChoice, BoardKind, Found, find};
 use crate::axi_dma::DmaError;
@@ -179,8 +180,8 @@ fn each_dma_core_behind_a_node_of_its_own_has_one_user() {
     find().expect("nobody has it");
 }
 
-#[test]
-fn dev_mem_carries_registers_and_memory_of_one_board() {
+/// A system with a `/dev/mem`, and windows in it.
+fn dev_mem() -> (tempfile::TempDir, System, DevMemWindows) {
     let root = tempfile::tempdir().expect("a directory");
     let system = System::under(root.path());
     uio_fake::write(system.dev.join("mem"), "");
@@ -191,6 +192,26 @@ fn dev_mem_carries_registers_and_memory_of_one_board() {
         control: 0x4_0000,
         memory: 0x8_0000..0x9_0000,
     };
+    (root, system, windows)
+}
+
+#[test]
+fn a_board_without_an_interrupt_is_polled_once_a_millisecond() {
+    let (_root, system, windows) = dev_mem();
+    let found = find_in(&system, &BoardChoice::DevMem(windows), &MemoryChoice::Automatic);
+    let Found { platform, .. } = found.expect("opened");
+    let hour = Duration::from_secs(3600);
+    for (timeout, least) in [(hour, 1000), (hour, 1000), (Duration::from_micros(300), 300)] {
+        let before = platform.now();
+        assert_eq!(platform.wait_interrupt(timeout).expect("polling"), None);
+        let waited = platform.now() - before;
+        assert!(waited >= Duration::from_micros(least) && waited < hour, "{waited:?}");
+    }
+}
+
+#[test]
+fn dev_mem_carries_registers_and_memory_of_one_board() {
+    let (_root, system, windows) = dev_mem();
     let choice = BoardChoice::DevMem(windows);
     for memory in [MemoryChoice::Automatic, MemoryChoice::DevMem { window: 0xA_0000..0xB_0000 }] {
         let Found { platform, .. } = find_in(&system, &choice, &memory).expect("opened once");

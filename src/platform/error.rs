@@ -459,18 +459,30 @@ pub enum PlatformError {
         /// The longest time for an answer.
         limit: std::time::Duration,
     },
-    /// The use of the file with a served board's memory failed.
-    #[error("cannot {act} {}, the memory of the board served at {}", memory.display(), socket.display())]
-    ServedMemory {
-        /// The attempt, as a verb.
-        act: &'static str,
-        /// The file.
-        memory: PathBuf,
+    /// The system of a served board does not give memory for another driver.
+    #[error(
+        "the board served at {} has no memory for this driver: make room there, or serve it with a \
+         smaller --memory-mib",
+        socket.display()
+    )]
+    ServerNoMemory {
         /// The socket.
         socket: PathBuf,
-        /// The kernel's answer.
+        /// The error of the server's kernel.
         #[source]
         source: std::io::Error,
+    },
+    /// The memory that came from a served board is not what the messages promise.
+    #[error(
+        "the board served at {} sent no memory that can be used: expected one sealed file of the \
+         announced length, found {found}; serve the board with the `pgs` of this driver",
+        socket.display()
+    )]
+    ServerMemory {
+        /// The socket.
+        socket: PathBuf,
+        /// What came.
+        found: String,
     },
     /// The process that serves a board speaks another version of the messages.
     #[error(
@@ -486,17 +498,17 @@ pub enum PlatformError {
         /// Version of the other side's.
         found: u32,
     },
-    /// A file is not the memory of the served board.
+    /// The process that serves a board refuses this driver, whose version is the right one.
     #[error(
-        "{} is not the memory of the board served at {}: name the file that its `pgs serve` names",
-        memory.display(),
+        "the board served at {} answers the first message with {found:?}, expected Done: serve the \
+         board with the `pgs` of this driver",
         socket.display()
     )]
-    OtherMemory {
+    ServerRefuses {
         /// The socket.
         socket: PathBuf,
-        /// The file.
-        memory: PathBuf,
+        /// The answer.
+        found: pgs_interface::message::Status,
     },
     /// The process that serves a board is gone, or sends nonsense.
     #[error("the board served at {} is lost: serve it again, and open it again", socket.display())]

@@ -48,7 +48,7 @@ pub(crate) use boards::emulated::EmulatedPlatform;
 pub use boards::hardware::MemoryChoice;
 pub(crate) use boards::hardware::{HardwarePlatform, RegisterChoice};
 #[cfg(feature = "emulation")]
-pub(crate) use boards::served::{RemotePlatform, memory_beside};
+pub(crate) use boards::served::RemotePlatform;
 pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use linux::dev_mem::DevMemWindows;

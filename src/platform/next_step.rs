@@ -36,7 +36,6 @@ impl PlatformError {
             Self::NoMaintenance { path, source } => Some(of_maintenance(path, source)),
             Self::SyncMode { path, source, .. } => Some(of_mode(path, source)),
             Self::NoServer { socket, source } => Some(of_socket(socket, source)),
-            Self::ServedMemory { memory, source, .. } => Some(of_served_memory(memory, source)),
             _ => None,
         }
     }
@@ -171,25 +170,6 @@ fn of_socket(socket: &Path, source: &io::Error) -> String {
                 .to_owned()
         }
         _ => format!("see whether the `pgs serve` of {path} still runs; otherwise {serve}"),
-    }
-}
-
-/// After a failure at the file with a served board's memory.
-fn of_served_memory(memory: &Path, source: &io::Error) -> String {
-    let path = memory.display();
-    match errno(source) {
-        Some(Errno::EACCES | Errno::EPERM) => format!(
-            "run as the user who serves the board, or let that user give the right to read and \
-             write {path} and to search its folders (chmod, chgrp)"
-        ),
-        Some(Errno::EROFS) => format!(
-            "{path} is on a file system that is mounted read-only here: mount it writable, as a \
-             container's volume without :ro"
-        ),
-        Some(Errno::EMFILE | Errno::ENFILE) => FEWER_FILES.to_owned(),
-        _ => "name the file that its `pgs serve` names, with --memory file:PATH (a container sees \
-              it only in a folder that both share)"
-            .to_owned(),
     }
 }
 

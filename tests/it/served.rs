@@ -2,7 +2,9 @@
 //! other side causes a panic or a wait without end.
 #![cfg(feature = "emulation")]
 
+use std::fs::File;
 use std::io::{Read as _, Write as _};
+use std::ops::Range;
 use std::os::unix::fs::{FileExt as _, MetadataExt as _, PermissionsExt as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
@@ -14,14 +16,16 @@ use std::time::{Duration, Instant};
 
 use crate::common::{bits, row};
 use bitstream_model::external::{ExternalAccelerator, ModelAccelerator};
-use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
+use bitstream_model::interface::address_map::MEMORY_BASE;
 use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::remote::{
-    Ended, MemoryFile, MemoryFileError, ServeError, Server, Stopper, Visit,
+    Ended, ServeError, Server, Stopper, Visit, receive_files, send_file,
 };
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
-use pgs_interface::message::{ANSWER_BYTES, Answer, Request, Status, VERSION};
+use pgs_interface::message::{
+    ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_UNIT, Request, RequestError, Status, VERSION,
+};
 use zynq_pgs::{
     Accelerator, BoardChoice, BoardKind, Body, Collision, Error, MemoryChoice, OpenError,
     OpenOptions, PlatformError, Shape, StepParameters, StepReport, Velocity,
@@ -49,8 +53,7 @@ impl Served {
     fn with(config: BoardConfig, accelerator: Option<Box<dyn ExternalAccelerator>>) -> Self {
         let folder = tempfile::tempdir().expect("a directory");
         let socket = folder.path().join("board");
-        let memory = memory(&socket).expect("memory");
-        let mut server = Server::bind(config, memory, &socket, accelerator).expect("served");
+        let mut server = Server::bind(config, MEMORY, &socket, accelerator).expect("served");
         server.set_driver_limit(DRIVER_LIMIT);
         let (board, stopper) = (server.board().clone(), server.stopper());
         let (sender, visits) = channel();
@@ -87,13 +90,11 @@ impl Served {
     }
 }
 
-fn memory(socket: &Path) -> Result<MemoryFile, MemoryFileError> {
-    let path = socket.with_extension("memory");
-    MemoryFile::open(&path, MEMORY_BASE, None, MEMORY_BYTES)
-}
+/// Bus addresses of the memory of a driver.
+const MEMORY: Range<u64> = MEMORY_BASE..MEMORY_BASE + (8 << 20);
 
 fn bind(config: BoardConfig, socket: &Path) -> Result<Server, ServeError> {
-    Server::bind(config, memory(socket)?, socket, None)
+    Server::bind(config, MEMORY, socket, None)
 }
 
 fn at(socket: &Path) -> OpenOptions {
@@ -101,20 +102,20 @@ fn at(socket: &Path) -> OpenOptions {
     OpenOptions { board, ..OpenOptions::default() }
 }
 
-/// The driver's memory is the file's 64 MiB at 0x5000_0000.
+/// The driver's memory is 8 MiB at `MEMORY_BASE`.
 #[test]
 fn memory_outside_the_fence_is_refused_by_name_before_a_step() {
     let fence = |text: &str| Some(text.parse::<Fence>().expect("a fence"));
     let served =
-        Served::new(BoardConfig { fence: fence("0x50000000+32M"), ..BoardConfig::default() });
+        Served::new(BoardConfig { fence: fence("0x50000000+4M"), ..BoardConfig::default() });
     let error = Accelerator::open(served.options()).expect_err("half of the memory is outside");
     let Error::Open(OpenError::Platform(PlatformError::OutsideFence { region, .. })) = &error
     else {
         panic!("{error:?}");
     };
-    assert!(region.ends_with("board.memory"), "{region}");
+    assert!(region.ends_with("board"), "{region}");
     let chain = format!("{error}: {}", std::error::Error::source(&error).expect("a cause"));
-    for part in ["67108864 bytes at 0x50000000", "the fence 0x50000000+32M", "device tree"] {
+    for part in ["8388608 bytes at 0x50000000", "the fence 0x50000000+4M", "device tree"] {
         assert!(chain.contains(part), "{chain}");
     }
     let served =
@@ -206,10 +207,11 @@ fn a_board_has_one_driver_at_a_time() {
     let served = Served::new(BoardConfig::default());
     let mut first = served.open();
     let error = Accelerator::open(served.options()).expect_err("another driver has it");
-    let Error::Open(OpenError::Platform(PlatformError::Busy { path })) = &error else {
-        panic!("{error}")
-    };
-    assert!(path.ends_with("board.memory"), "{path:?}");
+    assert!(
+        matches!(&error, Error::Open(OpenError::Platform(PlatformError::ServerBusy { socket }))
+            if *socket == served.socket()),
+        "{error}"
+    );
     steps(&mut first, 5);
     drop(first);
     steps(&mut served.open(), 5);
@@ -226,11 +228,7 @@ fn a_driver_that_leaves_in_the_middle_of_a_step_leaves_the_engines_running_for_t
     let served = Served::new(BoardConfig::default());
     let (mut bodies, collisions) = scene(40);
     let relay = Relay::new(&served.socket(), None);
-    let options = OpenOptions {
-        memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
-        ..at(&relay.socket)
-    };
-    let mut accelerator = Accelerator::open(options).expect("a board that opens");
+    let mut accelerator = Accelerator::open(at(&relay.socket)).expect("a board that opens");
     accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
     let parameters = StepParameters::default();
     let flight = accelerator.submit(&bodies, &collisions, &parameters).expect("it starts");
@@ -291,14 +289,23 @@ impl Relay {
             let mut number = 0;
             while driver.read_exact(&mut request).is_ok() {
                 let mut answer = vec![0; ANSWER_BYTES];
-                let passed = board.write_all(&request).and_then(|()| board.read_exact(&mut answer));
+                // A short message comes whole.
+                let passed = board
+                    .write_all(&request)
+                    .and_then(|()| receive_files(&board, &mut answer))
+                    .and_then(|(count, files)| match count {
+                        ANSWER_BYTES => Ok(files),
+                        _ => Err(std::io::ErrorKind::UnexpectedEof.into()),
+                    });
                 if let Some(falsify) = &falsify {
                     falsify(number, &request, &mut answer);
                 }
                 number += 1;
-                if passed.and_then(|()| driver.write_all(&answer)).is_err()
-                    || answer.len() < ANSWER_BYTES
-                {
+                let sent = passed.and_then(|files| match files.first() {
+                    Some(memory) => send_file(&driver, &answer, memory).map(drop),
+                    None => driver.write_all(&answer),
+                });
+                if sent.is_err() || answer.len() < ANSWER_BYTES {
                     // The test holds a copy of the socket.
                     let _ = driver.shutdown(std::net::Shutdown::Both);
                     return;
@@ -357,15 +364,11 @@ fn answers_that_make_no_sense_are_errors_at_every_point_of_a_step() {
         for number in [0, 1, 2, 30, 60, 90, 110] {
             let served = Served::new(BoardConfig::default());
             let relay = Relay::new(&served.socket(), Some(once(number, falsify)));
-            let options = OpenOptions {
-                memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
-                ..at(&relay.socket)
-            };
             let (mut bodies, collisions) = scene(10);
             let before = bits(&bodies);
             let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
             let parameters = StepParameters::default();
-            let stepped = Accelerator::open(options).and_then(|mut accelerator| {
+            let stepped = Accelerator::open(at(&relay.socket)).and_then(|mut accelerator| {
                 accelerator.set_shapes(&shapes)?;
                 accelerator.step(&mut bodies, &collisions, &parameters)
             });
@@ -398,11 +401,7 @@ fn a_board_of_endless_interrupts_and_no_time_is_given_up_in_time() {
         *answer = decoded.encode().to_vec();
     });
     let relay = Relay::new(&served.socket(), Some(falsify));
-    let options = OpenOptions {
-        memory: MemoryChoice::File { path: served.socket().with_extension("memory") },
-        ..at(&relay.socket)
-    };
-    let mut accelerator = Accelerator::open(options).expect("a board that opens");
+    let mut accelerator = Accelerator::open(at(&relay.socket)).expect("a board that opens");
     let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
     accelerator.set_shapes(&shapes).expect("shapes that fit");
     let (mut bodies, collisions) = scene(10);
@@ -467,7 +466,13 @@ fn requests_that_make_no_sense_end_the_visit_and_nothing_else() {
     let visit = served.visit();
     assert!(matches!(visit.ended, Ended::Left) && visit.requests == 3, "{visit:?}");
 
-    // A board with another version, or with another memory, names it.
+    // Each connection has one memory.
+    let (mut stream, _memory) = take_memory(&served);
+    assert_eq!(ask(&mut stream, &Request::Memory.encode()).status, Status::Refused);
+    drop(stream);
+    assert!(matches!(served.visit().ended, Ended::Refused(RequestError::SecondMemory)));
+
+    // A board with another version names it.
     let mut stream = raw(&served);
     let other = Request::Hello { version: VERSION + 1 }.encode();
     assert_eq!(ask(&mut stream, &other).status, Status::OtherVersion);
@@ -479,35 +484,81 @@ fn requests_that_make_no_sense_end_the_visit_and_nothing_else() {
 }
 
 #[test]
-fn another_file_than_the_boards_memory_is_refused() {
+fn a_choice_of_memory_is_refused_for_a_board_that_brings_it() {
     let served = Served::new(BoardConfig::default());
-    let other = served.folder.path().join("other");
-    let options = || {
-        let memory = MemoryChoice::File { path: other.clone() };
-        OpenOptions { memory, ..served.options() }
-    };
-    let error = Accelerator::open(options()).expect_err("there is none");
-    assert!(
-        matches!(error, Error::Open(OpenError::Platform(PlatformError::ServedMemory { .. }))),
-        "{error}"
-    );
-    std::fs::write(&other, [0; 1 << 16]).expect("written");
-    let error = Accelerator::open(options()).expect_err("not the board's");
-    assert!(
-        matches!(&error, Error::Open(OpenError::Platform(PlatformError::OtherMemory { memory, .. }))
-            if *memory == other),
-        "{error}"
-    );
-    // A file is no other board's memory either.
-    for memory in [MemoryChoice::Uio { node: "m".to_owned() }, MemoryChoice::File { path: other }] {
-        let board = match memory {
-            MemoryChoice::Uio { .. } => served.options().board,
-            _ => BoardChoice::Automatic,
-        };
-        let options = OpenOptions { board, memory, ..OpenOptions::default() };
-        let error = Accelerator::open(options).expect_err("not for this board");
-        assert!(matches!(error, Error::Open(OpenError::ServedMemory)), "{error}");
+    let memory = MemoryChoice::Uio { node: "m".to_owned() };
+    let options = OpenOptions { memory, ..served.options() };
+    let error = Accelerator::open(options).expect_err("not for this board");
+    assert!(matches!(error, Error::Open(OpenError::EmulatedMemory)), "{error}");
+    assert_eq!(served.board.violations(), []);
+}
+
+/// Says hello and takes the memory; returns it with the connection.
+fn take_memory(served: &Served) -> (UnixStream, File) {
+    let mut stream = raw(served);
+    let hello = Request::Hello { version: VERSION }.encode();
+    assert_eq!(ask(&mut stream, &hello).status, Status::Done);
+    stream.write_all(&Request::Memory.encode()).expect("sent");
+    let mut answer = [0; ANSWER_BYTES];
+    let (count, mut files) = receive_files(&stream, &mut answer).expect("answered");
+    let answer = Answer::decode(&answer).expect("an answer");
+    assert_eq!((count, answer.status, files.len()), (ANSWER_BYTES, Status::Done, 1));
+    let length = u64::from(answer.value) * MEMORY_UNIT;
+    assert_eq!((answer.number, answer.number + length), (MEMORY.start, MEMORY.end));
+    (stream, files.remove(0))
+}
+
+#[test]
+fn each_driver_gets_new_memory_that_nobody_else_reaches() {
+    let served = Served::new(BoardConfig::default());
+    let (stream, first) = take_memory(&served);
+    assert!(first.set_len(0).is_err() && first.set_len(1 << 30).is_err(), "its length is sealed");
+    first.write_all_at(b"secret", 0x1000).expect("its own");
+    // The board works on the driver's memory, and on no other.
+    let names: Vec<_> = std::fs::read_dir(served.folder.path()).expect("there").collect();
+    assert_eq!(names.len(), 1, "the socket alone: {names:?}");
+    drop(stream);
+    served.visit();
+    let (_stream, second) = take_memory(&served);
+    assert_ne!(inode(&first), inode(&second));
+    let mut found = [1; 6];
+    second.read_exact_at(&mut found, 0x1000).expect("inside");
+    assert_eq!(found, [0; 6], "nothing of the driver before");
+}
+
+fn inode(file: &File) -> u64 {
+    file.metadata().expect("measured").ino()
+}
+
+#[test]
+fn engines_that_a_driver_left_running_go_on_in_its_memory_and_in_no_other() {
+    let served = Served::new(BoardConfig::default());
+    let relay = Relay::new(&served.socket(), None);
+    let (mut bodies, collisions) = scene(40);
+    let mut accelerator = Accelerator::open(at(&relay.socket)).expect("a board that opens");
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    let parameters = StepParameters::default();
+    let flight = accelerator.submit(&bodies, &collisions, &parameters).expect("it starts");
+    relay.cut();
+    assert!(served.visit().left_running);
+    flight.wait(&mut bodies).expect_err("no board any more");
+
+    // The next driver resets nothing, so that the step goes on to its end.
+    let written = served.board.counts().beats_written;
+    let (mut stream, memory) = take_memory(&served);
+    let pause = Request::Pause { time: LONGEST_WAIT }.encode();
+    for _ in 0..100 {
+        assert_eq!(ask(&mut stream, &pause).status, Status::Done);
     }
+    assert!(!served.board.is_running());
+    assert!(served.board.counts().beats_written > written, "the step had its memory");
+    let bytes = usize::try_from(MEMORY.end - MEMORY.start).expect("a few MiB");
+    let mut found = vec![1; bytes];
+    memory.read_exact_at(&mut found, 0).expect("read");
+    assert!(found.iter().all(|byte| *byte == 0), "the new memory is untouched");
+    drop(stream);
+    assert!(!served.visit().left_running);
+    steps(&mut served.open(), 40);
     assert_eq!(served.board.violations(), []);
 }
 
@@ -531,103 +582,6 @@ fn a_socket_has_one_server_and_one_that_was_left_behind_is_replaced() {
     let error = bind(BoardConfig::default(), &left).expect_err("a file");
     assert!(matches!(error, ServeError::NoSocket { .. }), "{error}");
     assert_eq!(std::fs::read(&left).expect("there"), b"mine");
-}
-
-#[test]
-fn memory_is_a_file_of_whole_pages_that_no_driver_has() {
-    let served = Served::new(BoardConfig::default());
-    let path = served.socket().with_extension("memory");
-    let open = |wanted| MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES);
-    assert_eq!(open(None).expect("free").addresses(), 0x5000_0000..0x5400_0000);
-    let accelerator = served.open();
-    let error = open(None).expect_err("a driver has it");
-    assert!(matches!(error, MemoryFileError::Busy { .. }), "{error}");
-    drop(accelerator);
-    for (wanted, found) in [(Some(1 << 20), MEMORY_BYTES), (Some(1 << 15), 1 << 15)] {
-        let error = open(wanted).expect_err("another length");
-        assert!(matches!(error, MemoryFileError::Length { found: f, .. } if f == found), "{error}");
-    }
-    let error = MemoryFile::open(served.folder.path(), 0, None, 1 << 16).expect_err("a directory");
-    assert!(matches!(error, MemoryFileError::NotRegular { .. }), "{error}");
-    let error = MemoryFile::open(&path.join("x"), 0, None, 1 << 16).expect_err("no directory");
-    assert!(matches!(error, MemoryFileError::File { .. }), "{error}");
-}
-
-#[test]
-fn a_file_that_no_board_has_made_is_refused_whatever_its_length() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let path = folder.path().join("photos.tar");
-    let open = || MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20);
-    for length in [1, 4096, 1 << 16, (1 << 16) + 4096, 1 << 21, (1 << 20) + 4096] {
-        let content = vec![0x5A; length];
-        std::fs::write(&path, &content).expect("written");
-        let error = open().expect_err("a file of another owner");
-        let found = length as u64;
-        assert!(
-            matches!(&error, MemoryFileError::NotMade { found: f, .. } if *f == found),
-            "{error}"
-        );
-        assert!(error.to_string().contains("name another file, or remove it"), "{error}");
-        assert_eq!(std::fs::read(&path).expect("there"), content);
-    }
-
-    // An empty file holds nothing to lose; from now on it belongs to the board.
-    std::fs::write(&path, []).expect("written");
-    for _ in 0..2 {
-        let memory = open().expect("empty, then made");
-        assert_eq!(memory.addresses(), MEMORY_BASE..MEMORY_BASE + (1 << 20));
-    }
-    // With another length it is another file.
-    let made = std::fs::metadata(&path).expect("there").len();
-    for length in [made - 1, made - 4096, made + 1] {
-        let file = std::fs::File::options().write(true).open(&path).expect("there");
-        file.set_len(length).expect("changed");
-        let error = open().expect_err("changed");
-        assert!(matches!(error, MemoryFileError::NotMade { .. }), "{length}: {error}");
-    }
-}
-
-#[test]
-fn memory_is_reserved_and_what_the_file_system_does_not_give_is_refused() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let path = folder.path().join("memory");
-    let blocks = || std::fs::metadata(&path).expect("there").blocks() * 512;
-    MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20).expect("room");
-    assert!(blocks() >= 1 << 20, "{} bytes", blocks());
-    // A hole in the board's own file is filled.
-    let mark = std::fs::read(&path).expect("there").split_off(1 << 20);
-    let file = std::fs::File::create(&path).expect("emptied");
-    file.write_all_at(&mark, 1 << 20).expect("written");
-    assert!(blocks() < 1 << 20, "{} bytes", blocks());
-    MemoryFile::open(&path, MEMORY_BASE, None, 1 << 20).expect("room");
-    assert!(blocks() >= 1 << 20, "{} bytes", blocks());
-
-    // More bytes than any file system has.
-    let most = 1 << 62;
-    let whole = folder.path().join("whole");
-    let error = MemoryFile::open(&whole, 0, Some(most), 0).expect_err("no such file system");
-    assert!(matches!(&error, MemoryFileError::NoRoom { bytes, .. } if *bytes == most), "{error}");
-    assert!(error.to_string().contains("serve a smaller one"), "{error}");
-    assert!(!whole.exists(), "nothing that was begun is left");
-    std::fs::write(&whole, []).expect("written");
-    MemoryFile::open(&whole, 0, Some(most), 0).expect_err("no such file system");
-    assert_eq!(std::fs::metadata(&whole).expect("there still").len(), 0);
-}
-
-#[test]
-fn a_memory_that_was_changed_since_its_board_was_served_is_refused() {
-    let served = Served::new(BoardConfig::default());
-    let path = served.socket().with_extension("memory");
-    let file = std::fs::File::options().write(true).open(&path).expect("there");
-    file.set_len(1 << 16).expect("cut");
-    let error = Accelerator::open(served.options()).expect_err("cut");
-    assert!(
-        matches!(
-            error,
-            Error::Open(OpenError::Platform(PlatformError::UnusableMemory { bytes: 0x1_0000, .. }))
-        ),
-        "{error}"
-    );
 }
 
 /// The server's time limit of a driver.
@@ -679,21 +633,17 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
     assert!(matches!(served.visit().ended, Ended::Left));
 
     // Half a request, or an answer that the driver does not read, ends the visit, too.
-    let inode = std::fs::metadata(served.socket().with_extension("memory")).expect("there").ino();
-    let memory = Request::Memory { inode }.encode();
-    let mut half = raw(&served);
-    assert_eq!(ask(&mut half, &hello).status, Status::Done);
-    assert_eq!(ask(&mut half, &memory).status, Status::Done);
-    half.write_all(&memory[..15]).expect("sent");
+    let unmask = Request::Unmask.encode();
+    let (mut half, _memory) = take_memory(&served);
+    half.write_all(&unmask[..15]).expect("sent");
     half.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(half.read(&mut [0]).expect("hung up in time"), 0);
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
     assert_eq!(error.to_string(), "it sent half a request and no more within 1s");
 
-    let mut unread = raw(&served);
+    let (mut unread, _memory) = take_memory(&served);
     unread.set_write_timeout(Some(2 * NOTICE_LIMIT)).expect("set");
-    let many = memory.repeat(1 << 12);
-    unread.write_all(&hello).expect("sent");
+    let many = unmask.repeat(1 << 12);
     while unread.write_all(&many).is_ok() {}
     let Ended::Broken(error) = served.visit().ended else { panic!("it was broken off") };
     assert_eq!(error.to_string(), "it read no answer within 1s");
@@ -719,7 +669,7 @@ fn a_driver_that_is_idle_keeps_the_board_and_others_are_told_at_once() {
         assert_eq!(ask(&mut raw(&served), &[0; 16]).status, Status::Refused);
         let error = Accelerator::open(served.options()).expect_err("another driver has it");
         assert!(
-            matches!(&error, Error::Open(OpenError::Platform(PlatformError::Busy { .. }))),
+            matches!(&error, Error::Open(OpenError::Platform(PlatformError::ServerBusy { .. }))),
             "{error}"
         );
         std::thread::park_timeout(Duration::from_millis(50));

@@ -9,7 +9,8 @@
 //!
 //! act                       value               operand                 answer
 //! 1 hello                   protocol's version  HELLO                   value: version
-//! 2 memory                  0                   inode of the file       number: its bus address
+//! 2 memory                  0                   0                       number: its bus address; value:
+//!                                                                       its MEMORY_UNITs, or an errno
 //! 3 read                    0                   address                 value: the register's
 //! 4 write                   the new value       address
 //! 5 pause                   0                   ns, up to LONGEST_WAIT
@@ -20,13 +21,17 @@
 //! A driver sends the next request when it has the answer to the last one. The first is a hello,
 //! the second asks for the memory. Both come within seconds: from then on the driver has the board,
 //! and may take its time. The board answers every other hello with busy meanwhile.
+//!
+//! The memory is a new `memfd` for each connection, which comes beside the answer (`SCM_RIGHTS`). Its
+//! length is the announced one, for good: it is sealed with `F_SEAL_SHRINK`, `F_SEAL_GROW` and
+//! `F_SEAL_SEAL`. Byte 0 has the bus address of the answer.
 
 use std::time::Duration;
 
 use thiserror::Error;
 
 /// Version of these messages.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// "PGSBOARD": operand of a hello.
 pub const HELLO: u64 = u64::from_le_bytes(*b"PGSBOARD");
 /// Length of a request, bytes.
@@ -37,8 +42,8 @@ pub const ANSWER_BYTES: usize = 24;
 /// request again, so that an answer always comes soon.
 pub const LONGEST_WAIT: Duration = Duration::from_millis(10);
 
-/// The memory's file has the socket's name and this suffix, unless the user names another file.
-pub const MEMORY_SUFFIX: &str = ".memory";
+/// The memory's length is a multiple of this, bytes: the largest page of any kernel.
+pub const MEMORY_UNIT: u64 = 1 << 16;
 
 /// One request of a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,11 +53,8 @@ pub enum Request {
         /// Version of the messages that the driver speaks.
         version: u32,
     },
-    /// Is this the board's memory, and where on the bus?
-    Memory {
-        /// Inode of the file that the driver has open.
-        inode: u64,
-    },
+    /// Memory of this driver's own, and its place on the bus.
+    Memory,
     /// A register read.
     Read {
         /// Physical address.
@@ -101,6 +103,9 @@ pub enum RequestError {
         /// The wait as received.
         found: Duration,
     },
+    /// A driver asks twice.
+    #[error("expected one request for memory, found another")]
+    SecondMemory,
     /// The first request is not a hello.
     #[error("expected a hello first, found {found:?}")]
     NoHello {
@@ -116,7 +121,7 @@ impl Request {
         let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         let (act, value, operand) = match *self {
             Self::Hello { version } => (1_u32, version, HELLO),
-            Self::Memory { inode } => (2, 0, inode),
+            Self::Memory => (2, 0, 0),
             Self::Read { address } => (3, 0, address),
             Self::Write { address, value } => (4, value, address),
             Self::Pause { time } => (5, 0, nanoseconds(time)),
@@ -143,7 +148,7 @@ impl Request {
         Ok(match act {
             1 if operand == HELLO => Self::Hello { version: value },
             1 => return Err(RequestError::Hello { found: operand }),
-            2 => Self::Memory { inode: operand },
+            2 => Self::Memory,
             3 => Self::Read { address: operand },
             4 => Self::Write { address: operand, value },
             5 => Self::Pause { time: time()? },
@@ -161,8 +166,8 @@ pub enum Status {
     Done,
     /// No interrupt came.
     Nothing,
-    /// The file is not the board's memory.
-    OtherMemory,
+    /// The server's system does not give the memory: the value is its error number.
+    NoMemory,
     /// The board speaks another version.
     OtherVersion,
     /// The bytes were not a request. The board hangs up.
@@ -172,14 +177,8 @@ pub enum Status {
 }
 
 impl Status {
-    const ALL: [Self; 6] = [
-        Self::Done,
-        Self::Nothing,
-        Self::OtherMemory,
-        Self::OtherVersion,
-        Self::Refused,
-        Self::Busy,
-    ];
+    const ALL: [Self; 6] =
+        [Self::Done, Self::Nothing, Self::NoMemory, Self::OtherVersion, Self::Refused, Self::Busy];
 }
 
 /// The board's answer to a request.
@@ -187,7 +186,7 @@ impl Status {
 pub struct Answer {
     /// How the request went.
     pub status: Status,
-    /// A register, a version, or the number of an interrupt.
+    /// A register, a version, a length, an error number, or the number of an interrupt.
     pub value: u32,
     /// An address.
     pub number: u64,
@@ -253,7 +252,7 @@ mod tests {
         let time = Duration::from_nanos(9_876_543);
         for request in [
             Request::Hello { version: 7 },
-            Request::Memory { inode: u64::MAX },
+            Request::Memory,
             Request::Read { address: 0x1_0203_0405_0607 },
             Request::Write { address: 0xA004_0000, value: 0xF00D_CAFE },
             Request::Pause { time },

@@ -15,6 +15,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use bytemuck::allocation::try_zeroed_slice_box;
+
 use self::external::{DeviceMemory, ExternalMemory};
 use crate::cast::index;
 use crate::config::BoardConfig;
@@ -43,6 +45,15 @@ pub enum MemoryError {
         bytes: u64,
         /// The end of the addresses that the DMAs can carry.
         limit: u64,
+    },
+    /// The system has no room for the buffer.
+    #[error(
+        "the system has no memory for a buffer of {bytes} bytes: free some, or raise the limit on it \
+         (ulimit -v)"
+    )]
+    System {
+        /// Bytes asked for.
+        bytes: u64,
     },
     /// No range begins there.
     #[error("no buffer was allocated at {address:#x}")]
@@ -271,8 +282,8 @@ impl Memory {
         if bytes > DDR_LOW.end {
             return Err(MemoryError::Exhausted { bytes, limit: self.address_limit });
         }
-        let address = self.insert(bytes, Content::Cpu)?;
-        Ok((address, vec![Beat::default(); beats].into()))
+        let buffer = try_zeroed_slice_box(beats).map_err(|()| MemoryError::System { bytes })?;
+        Ok((self.insert(bytes, Content::Cpu)?, buffer))
     }
 
     pub(crate) fn allocate_shared(

@@ -1,6 +1,7 @@
 //! The board's end of a connection: requests come in piece by piece, and answers go out in bounded
 //! time.
 
+use std::fs::File;
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
@@ -9,6 +10,7 @@ use std::time::{Duration, Instant};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
+use super::passing::send_file;
 use pgs_interface::message::{ANSWER_BYTES, REQUEST_BYTES};
 
 /// A connection, and the bytes of its next request that have arrived.
@@ -87,14 +89,22 @@ impl Connection {
         }
     }
 
-    /// Sends an answer.
-    pub(super) fn send(&mut self, answer: &[u8; ANSWER_BYTES]) -> io::Result<()> {
+    /// Sends an answer, with a file beside it if there is one.
+    pub(super) fn send(
+        &mut self,
+        answer: &[u8; ANSWER_BYTES],
+        mut file: Option<&File>,
+    ) -> io::Result<()> {
         let until = Instant::now() + self.limit;
         let mut rest = answer.as_slice();
         while !rest.is_empty() {
-            match self.stream.write(rest) {
+            let written = match file {
+                Some(file) => send_file(&self.stream, rest, file),
+                None => self.stream.write(rest),
+            };
+            match written {
                 Ok(0) => return Err(ErrorKind::WriteZero.into()),
-                Ok(written) => rest = &rest[written..],
+                Ok(written) => (rest, file) = (&rest[written..], None),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     if Instant::now() >= until {

@@ -99,7 +99,7 @@ impl PendingConnections {
             };
             log::info!("refused a connection while a driver has the board: {status:?}");
             let answer = Answer { status, value: VERSION, number: 0, now };
-            if let Err(error) = connection.send(&answer.encode()) {
+            if let Err(error) = connection.send(&answer.encode(), None) {
                 log::info!("the refused connection ended before the answer: {error}");
             }
         }

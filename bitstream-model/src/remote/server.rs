@@ -3,6 +3,7 @@
 use std::fs;
 use std::io;
 use std::net::Shutdown;
+use std::ops::Range;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::FileTypeExt as _;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -15,7 +16,7 @@ use nix::errno::Errno;
 use thiserror::Error;
 
 use super::connect::connect;
-use super::memory_file::{MemoryFile, MemoryFileError};
+use super::memory::{Memories, MemoryError};
 use super::pending::{Caller, PendingConnections};
 use super::visit::{Ended, Session, Visit};
 use crate::config::{BoardConfig, ConfigError};
@@ -32,9 +33,9 @@ pub enum ServeError {
     /// The configuration is invalid.
     #[error("the board cannot be built")]
     Config(#[from] ConfigError),
-    /// The board's memory cannot be opened.
-    #[error(transparent)]
-    Memory(#[from] MemoryFileError),
+    /// There is no memory for the first driver.
+    #[error("the board has no memory")]
+    Memory(#[from] MemoryError),
     /// Another board is served there.
     #[error(
         "a board is served at {} already: end that server, or name another socket",
@@ -97,26 +98,27 @@ impl Stopper {
     }
 }
 
-/// A board at a socket. Dropping it removes the socket; the memory's file stays.
+/// A board at a socket. Dropping it removes the socket.
 #[derive(Debug)]
 pub struct Server {
     board: EmulatedBoard,
-    /// Inode and bus address of the memory.
-    memory: (u64, u64),
+    memory: Memories,
     pending: PendingConnections,
     path: PathBuf,
     stopper: Stopper,
 }
 
 impl Server {
-    /// Builds a board on `memory`, around another accelerator if there is one, and opens the socket.
-    /// It replaces the socket of a server that was killed.
+    /// Builds a board, around another accelerator if there is one, and opens the socket. `memory`
+    /// has the bus addresses of each driver's memory: a multiple of
+    /// [`MEMORY_UNIT`](pgs_interface::message::MEMORY_UNIT) bytes. It replaces the socket of a server
+    /// that was killed.
     ///
     /// # Errors
     /// [`ServeError`].
     pub fn bind(
         config: BoardConfig,
-        memory: MemoryFile,
+        memory: Range<u64>,
         socket: &Path,
         accelerator: Option<Box<dyn ExternalAccelerator>>,
     ) -> Result<Self, ServeError> {
@@ -141,10 +143,9 @@ impl Server {
                 },
             }
         }
-        let granted = memory.addresses();
-        let identity = (memory.inode(), granted.start);
-        let memory = Box::new(memory);
-        let board = EmulatedBoard::on_memory(config, memory, vec![granted], accelerator)?;
+        let memory = Memories::new(memory)?;
+        let (on, granted) = (Box::new(memory.of_board()), vec![memory.addresses()]);
+        let board = EmulatedBoard::on_memory(config, on, granted, accelerator)?;
         let listener = UnixListener::bind(socket).map_err(failed("opened"))?;
         let same = listener.try_clone().map_err(failed("shared"))?;
         let stopper = Stopper(Arc::new(Stop {
@@ -153,7 +154,7 @@ impl Server {
             visitor: Mutex::new(None),
         }));
         let pending = PendingConnections::new(listener).map_err(failed("shared"))?;
-        Ok(Self { board, memory: identity, pending, path, stopper })
+        Ok(Self { board, memory, pending, path, stopper })
     }
 
     /// The board, as its builder sees it.
@@ -209,7 +210,8 @@ impl Server {
             }
             let visit = match caller {
                 Ok(connection) => {
-                    Session::new(&self.board, self.memory, connection, &mut self.pending).serve()
+                    Session::new(&self.board, &mut self.memory, connection, &mut self.pending)
+                        .serve()
                 }
                 Err(ended) => Visit { requests: 0, ended, left_running: self.board.is_running() },
             };

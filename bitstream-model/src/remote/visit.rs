@@ -1,12 +1,16 @@
 //! Serves one driver, from its hello until it is gone.
 
 use std::io::{self, ErrorKind};
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use super::connection::{Connection, Presence, late};
+use super::memory::{Memories, MemoryError};
 use super::pending::PendingConnections;
 use crate::handle::{CpuPort, EmulatedBoard};
-use pgs_interface::message::{Answer, REQUEST_BYTES, Request, RequestError, Status, VERSION};
+use pgs_interface::message::{
+    Answer, MEMORY_UNIT, REQUEST_BYTES, Request, RequestError, Status, VERSION,
+};
 
 /// Virtual time between two checks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);
@@ -40,9 +44,8 @@ pub struct Visit {
 pub(super) struct Session<'a> {
     board: &'a EmulatedBoard,
     port: CpuPort,
-    /// Inode and bus address of the memory.
-    memory: (u64, u64),
-    /// Whether the board has confirmed the driver's memory.
+    memory: &'a mut Memories,
+    /// Whether the driver has got its memory.
     has_memory: bool,
     connection: Connection,
     pending: &'a mut PendingConnections,
@@ -61,7 +64,7 @@ impl Ended {
 impl<'a> Session<'a> {
     pub(super) fn new(
         board: &'a EmulatedBoard,
-        memory: (u64, u64),
+        memory: &'a mut Memories,
         connection: Connection,
         pending: &'a mut PendingConnections,
     ) -> Self {
@@ -73,7 +76,9 @@ impl<'a> Session<'a> {
     pub(super) fn serve(mut self) -> Visit {
         let mut requests = 0;
         let ended = self.serve_all(&mut requests).unwrap_or_else(Ended::of);
-        Visit { requests, ended, left_running: self.board.is_running() }
+        let left_running = self.board.is_running();
+        self.memory.take_back(left_running);
+        Visit { requests, ended, left_running }
     }
 
     fn serve_all(&mut self, requests: &mut u64) -> io::Result<Ended> {
@@ -82,6 +87,7 @@ impl<'a> Session<'a> {
             let request = Request::decode(&bytes).and_then(|request| match request {
                 Request::Hello { .. } => Ok(request),
                 found if first => Err(RequestError::NoHello { found }),
+                Request::Memory if self.has_memory => Err(RequestError::SecondMemory),
                 _ => Ok(request),
             });
             let request = match request {
@@ -122,11 +128,13 @@ impl<'a> Session<'a> {
     }
 
     fn answer(&mut self, status: Status, value: u32, number: u64) -> io::Result<()> {
-        self.connection.send(&Answer { status, value, number, now: self.port.now() }.encode())
+        let answer = Answer { status, value, number, now: self.port.now() };
+        self.connection.send(&answer.encode(), None)
     }
 
     fn serve_one(&mut self, request: Request) -> io::Result<Presence> {
         log::trace!("board: {request:?}");
+        self.memory.put_in(self.board);
         match request {
             Request::Hello { version } => {
                 let status = if version == VERSION { Status::Done } else { Status::OtherVersion };
@@ -136,12 +144,7 @@ impl<'a> Session<'a> {
                     return Ok(Presence::Gone);
                 }
             }
-            Request::Memory { inode } => {
-                let (own, address) = self.memory;
-                self.has_memory = inode == own;
-                let status = if self.has_memory { Status::Done } else { Status::OtherMemory };
-                self.answer(status, 0, address)?;
-            }
+            Request::Memory => self.hand_out()?,
             Request::Read { address } => {
                 let value = self.port.read32(address);
                 self.answer(Status::Done, value, 0)?;
@@ -175,6 +178,31 @@ impl<'a> Session<'a> {
         Ok(Presence::There)
     }
 
+    /// Gives the driver its memory.
+    fn hand_out(&mut self) -> io::Result<()> {
+        let Range { start, end } = self.memory.addresses();
+        let now = self.port.now();
+        let no_memory = |error: &MemoryError| {
+            log::error!("a driver gets no memory: {error}");
+            let errno = match error {
+                MemoryError::NoRoom { source, .. } => source.raw_os_error(),
+                MemoryError::Length { .. } => None,
+            };
+            let value = errno.and_then(|errno| u32::try_from(errno).ok()).unwrap_or(0);
+            Answer { status: Status::NoMemory, value, number: 0, now }
+        };
+        match self.memory.make() {
+            Ok(file) => {
+                let value = u32::try_from((end - start) / MEMORY_UNIT).unwrap_or(u32::MAX);
+                let answer = Answer { status: Status::Done, value, number: start, now };
+                self.connection.send(&answer.encode(), Some(file))?;
+                self.has_memory = true;
+                Ok(())
+            }
+            Err(error) => self.connection.send(&no_memory(&error).encode(), None),
+        }
+    }
+
     /// Lets virtual time pass as long as the driver is there. If the driver is killed, the board
     /// stops at that time.
     fn pass(
@@ -202,8 +230,11 @@ impl<'a> Session<'a> {
     /// still there. Other drivers that send a request meanwhile get a refusal.
     fn check_presence(&mut self, until: Option<Instant>) -> io::Result<Presence> {
         let sent = self.pending.wait_for(Some(&self.connection), until)?;
-        self.pending.refuse_callers(self.port.now());
-        if sent { self.connection.read_available() } else { Ok(Presence::There) }
+        let presence = if sent { self.connection.read_available()? } else { Presence::There };
+        if presence == Presence::There {
+            self.pending.refuse_callers(self.port.now());
+        }
+        Ok(presence)
     }
 }
 

@@ -1,8 +1,6 @@
 //! Drives a real board: finds and maps its registers and memory, and waits for its interrupt.
 
 use std::ops::Range;
-#[cfg(feature = "emulation")]
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -47,12 +45,6 @@ pub enum MemoryChoice {
     DevMem {
         /// Its physical addresses.
         window: Range<u64>,
-    },
-    /// A file: the memory of a board in another process, if it is not the file beside its socket.
-    #[cfg(feature = "emulation")]
-    File {
-        /// The file.
-        path: PathBuf,
     },
 }
 

@@ -1,24 +1,21 @@
 //! Drives a board in another process: registers, interrupt and time through a socket, memory for
-//! DMA in a file that both processes have open.
+//! DMA in a file that comes through it, new for each driver.
 //!
-//! The file is locked like every device file: the board has one driver at a time. The clock is the
-//! board's and virtual: it advances with each request, and each answer carries its time.
+//! The board has one driver at a time, by its server's rule. The clock is the board's and virtual: it
+//! advances with each request, and each answer carries its time.
 
-use std::ffi::OsString;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
-use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use bitstream_model::remote::{connect, mark};
+use bitstream_model::remote::{SEALS, connect, receive_files};
+use nix::fcntl::{FcntlArg, SealFlag, fcntl};
+use pgs_interface::message::{ANSWER_BYTES, Answer, MEMORY_UNIT, Request, Status, VERSION};
 
-use pgs_interface::message::{ANSWER_BYTES, Answer, MEMORY_SUFFIX, Request, Status, VERSION};
-
-use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::memory::pool::Pool;
 use crate::platform::{
@@ -36,13 +33,6 @@ const ANSWER_LIMIT: Duration = Duration::from_secs(60);
 /// Longest real time in which a free board answers the hello of a driver.
 const HELLO_LIMIT: Duration = Duration::from_secs(10);
 
-/// The default file for the memory of a board served at `socket`.
-pub(crate) fn memory_beside(socket: &Path) -> PathBuf {
-    let mut path = OsString::from(socket);
-    path.push(MEMORY_SUFFIX);
-    path.into()
-}
-
 /// A board in another process.
 #[derive(Debug)]
 pub(crate) struct RemotePlatform {
@@ -51,65 +41,68 @@ pub(crate) struct RemotePlatform {
 }
 
 impl RemotePlatform {
-    /// Connects to the board served at `socket`, whose memory is the file `memory`. No register is
-    /// touched.
-    pub(crate) fn open(socket: &Path, memory: &Path) -> Result<Self, PlatformError> {
-        Self::open_within(socket, memory, HELLO_LIMIT)
+    /// Connects to the board served at `socket`. No register is touched.
+    pub(crate) fn open(socket: &Path) -> Result<Self, PlatformError> {
+        Self::open_within(socket, HELLO_LIMIT)
     }
 
     /// The same for a board that answers the hello within `limit`.
-    fn open_within(socket: &Path, memory: &Path, limit: Duration) -> Result<Self, PlatformError> {
+    fn open_within(socket: &Path, limit: Duration) -> Result<Self, PlatformError> {
         let line = Line::connect(socket, limit)?;
-        let error = |act| {
-            move |source| PlatformError::ServedMemory {
-                act,
-                memory: memory.to_owned(),
-                socket: socket.to_owned(),
-                source,
-            }
-        };
-        let file = File::options().read(true).write(true).open(memory).map_err(error("open"))?;
-        let lock = Arc::new(LockedFile::of_file(file, memory)?);
-        let metadata = lock.file().metadata().map_err(error("measure"))?;
-
         let hello = line.hello(limit)?;
-        if hello.status == Status::Busy {
-            return Err(PlatformError::ServerBusy { socket: socket.to_owned() });
+        let socket = || socket.to_owned();
+        match hello.status {
+            Status::Done if hello.value == VERSION => {}
+            Status::Busy => return Err(PlatformError::ServerBusy { socket: socket() }),
+            Status::Done | Status::OtherVersion if hello.value != VERSION => {
+                return Err(PlatformError::OtherServer {
+                    socket: socket(),
+                    expected: VERSION,
+                    found: hello.value,
+                });
+            }
+            status => {
+                return Err(PlatformError::ServerRefuses { socket: socket(), found: status });
+            }
         }
         line.set_limit(ANSWER_LIMIT)?;
-        if hello.status != Status::Done || hello.value != VERSION {
-            return Err(PlatformError::OtherServer {
-                socket: socket.to_owned(),
-                expected: VERSION,
-                found: hello.value,
-            });
+        let (placed, files) = line.exchange(Request::Memory)?;
+        if placed.status == Status::NoMemory {
+            let errno = i32::try_from(placed.value).unwrap_or(0);
+            let source = io::Error::from_raw_os_error(errno);
+            return Err(PlatformError::ServerNoMemory { socket: socket(), source });
         }
-        let placed = line.ask(Request::Memory { inode: metadata.ino() })?;
-        if placed.status != Status::Done {
-            let (socket, memory) = (socket.to_owned(), memory.to_owned());
-            return Err(PlatformError::OtherMemory { socket, memory });
-        }
-        let name = memory.display().to_string();
-        let address = placed.number;
-        let marked = mark::memory_bytes(lock.file()).map_err(error("measure"))?;
-        let bytes = marked.ok_or_else(|| PlatformError::UnusableMemory {
-            region: name.clone(),
-            address,
-            bytes: metadata.len(),
-            reason: "it was changed since its board was served; end that `pgs serve`, remove the \
-                     file, and serve the board again",
-        })?;
-        let length = usize::try_from(bytes).map_err(|_| PlatformError::UnusableMemory {
-            region: name.clone(),
-            address,
-            bytes,
-            reason: "make it smaller",
-        })?;
-        let mapping = Mapping::new(&lock, 0, 0, length)?;
-        let memory = ReservedMemory::new(mapping, address, name)?;
+        let (file, length) = checked_memory(&placed, files)
+            .map_err(|found| PlatformError::ServerMemory { socket: socket(), found })?;
+        let mapping = Mapping::of_private(&file, &line.socket, length)?;
+        let memory =
+            ReservedMemory::new(mapping, placed.number, line.socket.display().to_string())?;
         log::info!("memory for DMA: {} bytes at {:#x}", memory.bytes(), memory.address());
         Ok(Self { line: Arc::new(line), pool: Pool::new(Box::new(memory)) })
     }
+}
+
+/// The file of a board's memory and its length, or what came instead. Nobody can take a byte of it
+/// away, which would end this process with SIGBUS.
+fn checked_memory(placed: &Answer, mut files: Vec<File>) -> Result<(File, usize), String> {
+    if placed.status != Status::Done {
+        return Err(format!("the status {:?}", placed.status));
+    }
+    let count = files.len();
+    let (Some(file), 1) = (files.pop(), count) else { return Err(format!("{count} files")) };
+    let announced = u64::from(placed.value) * MEMORY_UNIT;
+    let bytes = file.metadata().map_or(0, |metadata| metadata.len());
+    if bytes != announced || bytes == 0 || placed.number.checked_add(bytes).is_none() {
+        return Err(format!("{bytes} bytes at {:#x}, announced as {announced}", placed.number));
+    }
+    // No file but a memfd has seals.
+    let seals =
+        fcntl(&file, FcntlArg::F_GET_SEALS).map_or(SealFlag::empty(), SealFlag::from_bits_retain);
+    if !seals.contains(SEALS) {
+        return Err(format!("a file with the seals {seals:?}"));
+    }
+    let length = usize::try_from(bytes).map_err(|_| format!("{bytes} bytes"))?;
+    Ok((file, length))
 }
 
 /// The connection to a board.
@@ -171,13 +164,19 @@ impl Line {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One request and its answer. After the first failure the board is lost for good.
+    /// One request and its answer.
     fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
+        self.exchange(request).map(|(answer, _)| answer)
+    }
+
+    /// One request, its answer, and the files that come beside it. After the first failure the board
+    /// is lost for good.
+    fn exchange(&self, request: Request) -> Result<(Answer, Vec<File>), PlatformError> {
         let mut state = self.state();
         if state.lost.is_none() {
             let limit = state.limit;
             match exchange(&mut state.stream, request, limit) {
-                Ok(answer) => {
+                Ok((answer, files)) => {
                     // A clock that stands still or runs backwards would make waits endless.
                     let waited = match (request, answer.status) {
                         (Request::Pause { time }, _)
@@ -185,7 +184,7 @@ impl Line {
                         _ => Duration::ZERO,
                     };
                     state.now = answer.now.max(state.now.saturating_add(waited));
-                    return Ok(answer);
+                    return Ok((answer, files));
                 }
                 Err(error) => {
                     log::error!("the board served at {} is lost: {error}", self.socket.display());
@@ -207,8 +206,13 @@ impl Line {
     }
 }
 
-/// Sends a request and reads its answer. The whole answer must arrive within `limit`.
-fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::Result<Answer> {
+/// Sends a request and reads its answer, and the files beside it. The whole answer must arrive within
+/// `limit`.
+fn exchange(
+    stream: &mut UnixStream,
+    request: Request,
+    limit: Duration,
+) -> io::Result<(Answer, Vec<File>)> {
     let until = Instant::now() + limit;
     let late = || io::Error::new(io::ErrorKind::TimedOut, format!("no answer within {limit:?}"));
     // The kernel reports a transfer that has timed out as `WouldBlock`.
@@ -218,9 +222,18 @@ fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::R
     };
     stream.write_all(&request.encode()).map_err(timed)?;
     let mut bytes = [0; ANSWER_BYTES];
-    let mut filled = 0;
+    let (mut filled, mut files) = (0, Vec::new());
     while filled < ANSWER_BYTES {
-        match stream.read(&mut bytes[filled..]) {
+        let rest = &mut bytes[filled..];
+        // Files that come beside any other answer are closed unseen.
+        let read = match request {
+            Request::Memory => receive_files(stream, rest).map(|(read, more)| {
+                files.extend(more);
+                read
+            }),
+            _ => stream.read(rest),
+        };
+        match read {
             Ok(0) => return Err(closed()),
             Ok(read) => filled += read,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -236,7 +249,7 @@ fn exchange(stream: &mut UnixStream, request: Request, limit: Duration) -> io::R
         let text = format!("it does not understand {request:?}");
         return Err(io::Error::new(io::ErrorKind::InvalidData, text));
     }
-    Ok(answer)
+    Ok((answer, files))
 }
 
 fn closed() -> io::Error {
@@ -321,6 +334,10 @@ impl Platform for RemotePlatform {
 mod tests {
     use std::os::unix::net::UnixListener;
 
+    use bitstream_model::remote::send_file;
+    use nix::sys::memfd::{MFdFlags, memfd_create};
+    use pgs_interface::message::REQUEST_BYTES;
+
     use super::*;
     use crate::platform::memory::reserved::fake::reserved;
     use crate::platform::{Deadline, poll_until};
@@ -355,27 +372,111 @@ mod tests {
         assert_eq!(sent, Request::Unmask.encode());
     }
 
-    /// A folder with a bound socket and a file for the memory.
-    fn bound() -> (tempfile::TempDir, PathBuf, PathBuf, UnixListener) {
+    /// A folder with a bound socket.
+    fn bound() -> (tempfile::TempDir, PathBuf, UnixListener) {
         let folder = tempfile::tempdir().expect("a directory");
-        let (socket, memory) = (folder.path().join("board"), folder.path().join("memory"));
+        let socket = folder.path().join("board");
         let listener = UnixListener::bind(&socket).expect("bound");
-        File::create(&memory).expect("made");
-        (folder, socket, memory, listener)
+        (folder, socket, listener)
     }
 
     #[test]
     fn a_server_that_does_not_answer_the_first_message_is_silent_and_not_lost() {
-        let (_folder, socket, memory, _listener) = bound();
+        let (_folder, socket, _listener) = bound();
         let limit = Duration::from_millis(20);
-        let error = RemotePlatform::open_within(&socket, &memory, limit).expect_err("no answer");
+        let error = RemotePlatform::open_within(&socket, limit).expect_err("no answer");
         assert!(matches!(&error, PlatformError::ServerSilent { socket: s, .. } if *s == socket));
         assert!(error.to_string().contains("says nothing within 20ms"), "{error}");
     }
 
+    /// What a driver says to a server that gives these answers, the second with these files beside it.
+    fn refused(answers: [(Status, u32); 2], files: Vec<File>) -> PlatformError {
+        let (_folder, socket, listener) = bound();
+        let server = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().expect("the driver");
+            let mut request = [0; REQUEST_BYTES];
+            for (number, (status, value)) in answers.into_iter().enumerate() {
+                if stream.read_exact(&mut request).is_err() {
+                    return;
+                }
+                let answer = Answer { status, value, number: 0x5000_0000, now: Duration::ZERO };
+                let mut rest = &answer.encode()[..];
+                for file in files.iter().filter(|_| number == 1) {
+                    send_file(&stream, &rest[..4], file).expect("sent");
+                    rest = &rest[4..];
+                }
+                stream.write_all(rest).expect("sent");
+            }
+        });
+        let error = RemotePlatform::open(&socket).expect_err("refused");
+        server.join().expect("no panic");
+        error
+    }
+
+    #[test]
+    fn a_hello_that_is_refused_with_the_right_version_is_no_board() {
+        for status in [Status::OtherVersion, Status::NoMemory, Status::Nothing] {
+            let error = refused([(status, VERSION), (Status::Done, 1)], Vec::new());
+            assert!(
+                matches!(&error, PlatformError::ServerRefuses { found, .. } if *found == status),
+                "{error}"
+            );
+        }
+        for status in [Status::OtherVersion, Status::Done] {
+            let error = refused([(status, VERSION + 1), (Status::Done, 1)], Vec::new());
+            assert!(
+                matches!(error, PlatformError::OtherServer { found, .. } if found == VERSION + 1),
+                "{error}"
+            );
+        }
+        let error = refused([(Status::Busy, VERSION), (Status::Done, 1)], Vec::new());
+        assert!(matches!(error, PlatformError::ServerBusy { .. }), "{error}");
+    }
+
+    /// A file of memory with these seals.
+    fn memory(bytes: u64, seals: SealFlag) -> File {
+        let file = memfd_create("test", MFdFlags::MFD_ALLOW_SEALING).expect("made");
+        let file = File::from(file);
+        file.set_len(bytes).expect("set");
+        fcntl(&file, FcntlArg::F_ADD_SEALS(seals)).expect("sealed");
+        file
+    }
+
+    #[test]
+    fn memory_that_could_be_taken_away_is_refused_by_name() {
+        let (shrink, grow) = (SealFlag::F_SEAL_SHRINK, SealFlag::F_SEAL_GROW);
+        let good = || memory(MEMORY_UNIT, SEALS);
+        let cases: [(Vec<File>, u32, &str); 7] = [
+            (Vec::new(), 1, "found 0 files"),
+            (vec![good(), good()], 1, "found 2 files"),
+            (vec![good()], 2, "found 65536 bytes at 0x50000000, announced as 131072"),
+            (vec![memory(0, SEALS)], 0, "found 0 bytes"),
+            (
+                vec![memory(MEMORY_UNIT, shrink | grow)],
+                1,
+                "seals SealFlag(F_SEAL_SHRINK | F_SEAL_GROW)",
+            ),
+            (vec![memory(MEMORY_UNIT, SEALS - shrink | SealFlag::F_SEAL_SEAL)], 1, "F_SEAL_GROW"),
+            (vec![tempfile::tempfile().expect("a file")], 1, "found 0 bytes"),
+        ];
+        for (files, value, text) in cases {
+            let error = refused([(Status::Done, VERSION), (Status::Done, value)], files);
+            assert!(matches!(error, PlatformError::ServerMemory { .. }), "{error}");
+            assert!(error.to_string().contains(text), "{text}: {error}");
+        }
+        let plain = tempfile::tempfile().expect("a file");
+        plain.set_len(MEMORY_UNIT).expect("set");
+        let error = refused([(Status::Done, VERSION), (Status::Done, 1)], vec![plain]);
+        assert!(error.to_string().contains("found a file with the seals"), "{error}");
+        let errno = nix::errno::Errno::ENOMEM as u32;
+        let error = refused([(Status::Done, VERSION), (Status::NoMemory, errno)], Vec::new());
+        let PlatformError::ServerNoMemory { source, .. } = &error else { panic!("{error}") };
+        assert_eq!(source.kind(), io::ErrorKind::OutOfMemory, "{source}");
+    }
+
     #[test]
     fn an_answer_that_comes_drop_by_drop_is_late() {
-        let (_folder, socket, _memory, listener) = bound();
+        let (_folder, socket, listener) = bound();
         let limit = Duration::from_millis(200);
         let line = Line::connect(&socket, limit).expect("somebody listens");
         let dripping = std::thread::spawn(move || {

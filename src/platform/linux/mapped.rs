@@ -3,6 +3,7 @@
 
 use std::fs::File;
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 
 use memmap2::{MmapOptions, MmapRaw};
@@ -23,7 +24,8 @@ const LONGEST: u64 = 1 << 40;
 ///
 /// Every access here relies on one invariant: a region has one owner, and under that owner no
 /// access to a word meets a store to the same word from another thread. The lock keeps other
-/// mappings of the device file away, also mappings of this process. The owners do the rest: the
+/// mappings of the device file away, also mappings of this process; a file that came to this process
+/// alone needs none. The owners do the rest: the
 /// public types store through `&mut self`, the accelerator steps through `&mut self`, and the pool
 /// gives each piece of memory to one holder. The device's own accesses are not the language's
 /// concern: words and doublewords are volatile and aligned, and beats are handed over.
@@ -34,7 +36,7 @@ pub(crate) struct Mapping {
     start: usize,
     bytes: usize,
     /// Dropped after the map: the device file is locked as long as it is mapped.
-    _lock: Arc<LockedFile>,
+    _lock: Option<Arc<LockedFile>>,
 }
 
 impl Mapping {
@@ -57,21 +59,42 @@ impl Mapping {
         start: usize,
         bytes: usize,
     ) -> Result<Self, PlatformError> {
-        let path = || lock.path().to_owned();
-        let error = |source| PlatformError::File { act: "map", path: path(), source };
+        let map = Self::map(file, lock.path(), file_offset, start, bytes)?;
+        Ok(Self { _lock: Some(Arc::clone(lock)), ..map })
+    }
+
+    /// Maps the first `bytes` bytes of a file that nobody else in this process has, and that cannot
+    /// get shorter; `path` names it in errors.
+    #[cfg(feature = "emulation")]
+    pub(crate) fn of_private(
+        file: &File,
+        path: &Path,
+        bytes: usize,
+    ) -> Result<Self, PlatformError> {
+        Self::map(file, path, 0, 0, bytes)
+    }
+
+    fn map(
+        file: &File,
+        path: &Path,
+        file_offset: u64,
+        start: usize,
+        bytes: usize,
+    ) -> Result<Self, PlatformError> {
+        let error = |source| PlatformError::File { act: "map", path: path.to_owned(), source };
         if !start.is_multiple_of(BEAT_BYTES) || bytes < 4 {
             let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
             return Err(error(io::Error::new(io::ErrorKind::InvalidData, text)));
         }
         let length = start.checked_add(bytes).filter(|length| *length as u64 <= LONGEST);
         let length = length.ok_or_else(|| PlatformError::TooLarge {
-            region: path().display().to_string(),
+            region: path.display().to_string(),
             bytes: bytes as u64,
         })?;
-        require_bytes(file, lock.path(), file_offset.saturating_add(length as u64))?;
+        require_bytes(file, path, file_offset.saturating_add(length as u64))?;
         let map =
             MmapOptions::new().offset(file_offset).len(length).map_raw(file).map_err(error)?;
-        Ok(Self { map, start, bytes, _lock: Arc::clone(lock) })
+        Ok(Self { map, start, bytes, _lock: None })
     }
 
     /// Length of the region.
@@ -203,7 +226,7 @@ mod tests {
         let file = file_of(&[0; 16]);
         let lock = LockedFile::open(file.path(), 0).expect("nobody else has it");
         let map = MmapRaw::from(memmap2::MmapMut::map_anon(start + bytes).expect("mapped"));
-        Mapping { map, start, bytes, _lock: Arc::new(lock) }
+        Mapping { map, start, bytes, _lock: Some(Arc::new(lock)) }
     }
 
     #[test]

@@ -2,8 +2,10 @@
 //!
 //! The CPU maps it as Device memory: whole aligned beats only, through [`super::copy`].
 
+use std::io;
 use std::sync::Arc;
 
+use bytemuck::allocation::try_zeroed_slice_box;
 use pgs_interface::address_map::UIO_MEMORY_MAP;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
@@ -129,7 +131,13 @@ impl Region for ReservedMemory {
     }
 
     fn memory(&self, _: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
-        Ok(DmaMemory::Heap(vec![Beat::default(); beats].into()))
+        let heap = try_zeroed_slice_box(beats).map_err(|()| PlatformError::Memory {
+            act: "allocate",
+            what: "beats",
+            value: beats as u64,
+            source: Box::new(io::Error::from(io::ErrorKind::OutOfMemory)),
+        })?;
+        Ok(DmaMemory::Heap(heap))
     }
 
     fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {

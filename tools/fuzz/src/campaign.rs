@@ -18,8 +18,10 @@ use crate::targets::Target;
 /// The number of executions, and their settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
-    /// Executions.
+    /// Executions, at most.
     pub executions: u64,
+    /// Time after which no execution begins.
+    pub time: Duration,
     /// Seed of the inputs.
     pub seed: u64,
     /// Threads, at least one; fewer where the system does not give them.
@@ -118,7 +120,7 @@ impl Shared {
         'all: loop {
             let first = self.next.fetch_add(BLOCK, Ordering::Relaxed);
             for number in first..first.saturating_add(BLOCK).min(self.plan.executions) {
-                if self.stop.load(Ordering::Relaxed) {
+                if self.stop.load(Ordering::Relaxed) || self.start.elapsed() >= self.plan.time {
                     break 'all;
                 }
                 self.input(&mut input, number);
@@ -236,7 +238,8 @@ mod tests {
     use super::*;
 
     fn plan(executions: u64, threads: usize) -> Plan {
-        Plan { executions, seed: 3, threads, limit: Duration::from_secs(20) }
+        let limit = Duration::from_secs(20);
+        Plan { executions, time: Duration::MAX, seed: 3, threads, limit }
     }
 
     fn counts(input: &[u8]) -> Tally {
@@ -245,8 +248,7 @@ mod tests {
 
     #[test]
     fn every_execution_is_run_once_whatever_the_number_of_threads() {
-        static TARGET: Target =
-            Target { name: "counts", about: "", run: counts, longest: 9, share: 1 };
+        static TARGET: Target = Target { name: "counts", about: "", run: counts, longest: 9 };
         let one = run(&TARGET, &plan(1000, 1), |_| ());
         let four = run(&TARGET, &plan(1000, 4), |_| ());
         assert_eq!((one.executions, four.executions), (1000, 1000));
@@ -269,8 +271,7 @@ mod tests {
 
     #[test]
     fn where_the_system_refuses_threads_fewer_run_everything_and_the_summary_says_so() {
-        static TARGET: Target =
-            Target { name: "counts", about: "", run: counts, longest: 9, share: 1 };
+        static TARGET: Target = Target { name: "counts", about: "", run: counts, longest: 9 };
         let all = run(&TARGET, &plan(1000, 4), |_| ());
         assert!(all.threads.missing().is_none() && all.threads.ran == 4, "{:?}", all.threads);
         for (start, ran, watched) in [(two as Start, 2, true), (none, 1, false)] {
@@ -282,6 +283,16 @@ mod tests {
         }
     }
 
+    #[test]
+    fn time_ends_a_campaign_of_any_number_of_executions() {
+        static TARGET: Target = Target { name: "counts", about: "", run: counts, longest: 9 };
+        let time = Duration::from_millis(30);
+        let summary = run(&TARGET, &Plan { time, ..plan(u64::MAX, 2) }, |_| ());
+        assert!(summary.executions > 0 && summary.time >= time, "{summary:?}");
+        let none = run(&TARGET, &Plan { time: Duration::ZERO, ..plan(1000, 2) }, |_| ());
+        assert_eq!(none.executions, 0);
+    }
+
     fn fails(input: &[u8]) -> Tally {
         assert!(input.len() < 8, "an input of {} bytes", input.len());
         Tally::default()
@@ -289,8 +300,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_finding_whose_input_panics_again() {
-        static TARGET: Target =
-            Target { name: "fails", about: "", run: fails, longest: 9, share: 1 };
+        static TARGET: Target = Target { name: "fails", about: "", run: fails, longest: 9 };
         let summary = run(&TARGET, &plan(1000, 2), |_| ());
         let finding = summary.finding.expect("one in five inputs is that long");
         assert!(finding.input.len() >= 8);
@@ -314,8 +324,7 @@ mod tests {
 
     #[test]
     fn a_hang_is_a_finding_and_ends_the_campaign() {
-        static TARGET: Target =
-            Target { name: "hangs", about: "", run: hangs, longest: 9, share: 1 };
+        static TARGET: Target = Target { name: "hangs", about: "", run: hangs, longest: 9 };
         let limit = Duration::from_millis(300);
         let summary = run(&TARGET, &Plan { limit, ..plan(1000, 1) }, |_| ());
         let finding = summary.finding.expect("an input of nine bytes");

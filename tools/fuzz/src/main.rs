@@ -25,9 +25,13 @@ struct Args {
     /// The target, or `all`; `list` shows the targets
     #[arg(default_value = "all")]
     target: String,
-    /// Executions; `all` shares them out, more to the faster targets
-    #[arg(long, value_name = "N", default_value_t = 100_000)]
-    executions: u64,
+    /// Executions of each target, at most
+    #[arg(long, value_name = "N")]
+    executions: Option<u64>,
+    /// Time of all targets together, of which each gets the same share [default: 60, without
+    /// --executions]
+    #[arg(long, value_name = "SECONDS")]
+    seconds: Option<u64>,
     /// Seed of the inputs
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -48,6 +52,8 @@ struct Args {
     json: bool,
 }
 
+/// Default time of all targets together, s.
+const SECONDS: u64 = 60;
 /// Wrong usage, or a file or stdout that cannot be read or written.
 const USAGE: u8 = 2;
 
@@ -116,7 +122,13 @@ fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Resu
     let threads = args
         .threads
         .unwrap_or_else(|| thread::available_parallelism().map_or(1, std::num::NonZero::get));
-    let shares: u64 = chosen.iter().map(|target| u64::from(target.share)).sum();
+    // Equal shares of time: a target that finds much a second and one that takes long are heard alike.
+    let share = |seconds| Duration::from_secs(seconds).div_f64(chosen.len() as f64);
+    let time = match (args.seconds, args.executions) {
+        (Some(seconds), _) => share(seconds),
+        (None, Some(_)) => Duration::MAX,
+        (None, None) => share(SECONDS),
+    };
     let start = Instant::now();
     let mut summaries = Vec::new();
     if !args.json {
@@ -124,7 +136,8 @@ fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Resu
     }
     for target in chosen {
         let plan = Plan {
-            executions: (args.executions * u64::from(target.share)).div_ceil(shares),
+            executions: args.executions.unwrap_or(u64::MAX),
+            time,
             seed: args.seed,
             threads,
             limit: Duration::from_secs(args.limit),
@@ -132,7 +145,7 @@ fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Resu
         let show = std::io::stderr().is_terminal();
         let summary = campaign::run(target, &plan, |done| {
             if show {
-                eprint!("\r{}: {done} of {} ", target.name, plan.executions);
+                eprint!("\r{}: {done} ", target.name);
             }
         });
         if show {

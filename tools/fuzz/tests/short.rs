@@ -8,7 +8,8 @@ use fuzz::targets;
 
 fn short(name: &str, executions: u64) -> Summary {
     let target = targets::by_name(name).expect("a target");
-    let plan = Plan { executions, seed: 7, threads: 2, limit: Duration::from_secs(60) };
+    let limit = Duration::from_secs(60);
+    let plan = Plan { executions, time: Duration::MAX, seed: 7, threads: 2, limit };
     let summary = campaign::run(target, &plan, |_| ());
     if let Some(finding) = &summary.finding {
         panic!("{name}, execution {}: {}\n{:02x?}", finding.number, finding.ending, finding.input);

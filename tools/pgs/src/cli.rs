@@ -102,7 +102,6 @@ pub(crate) fn parse(
 fn reads(verb: &Verb) -> Reads {
     Reads {
         board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_)),
-        emulated_memory: matches!(verb, Verb::Serve(_)),
         manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_)),
         accelerator: match verb {
             Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
@@ -240,9 +239,8 @@ mod tests {
 
     #[test]
     fn a_served_board_is_named_by_its_socket() {
-        let common = parsed("pgs --board socket:/a/b --memory file:c run").expect("a board").common;
+        let common = parsed("pgs --board socket:/a/b run").expect("a board").common;
         assert_eq!(common.board, BoardName::Socket("/a/b".into()));
-        assert_eq!(common.memory, MemoryChoice::File { path: "c".into() });
         let served = parsed("pgs serve --socket x --profile half").expect("a board");
         assert!(matches!(served.verb, Verb::Serve(args) if args.socket.ends_with("x")));
     }

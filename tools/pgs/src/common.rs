@@ -32,8 +32,7 @@ pub(crate) struct CommonOptions {
     #[arg(
         help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
                 \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
-                devmem[:ADDRESS+BYTES]; of a served board: file:PATH [env: PGS_MEMORY] \
-                [default: auto]",
+                devmem[:ADDRESS+BYTES] [env: PGS_MEMORY] [default: auto]",
         long,
         global = true,
         value_name = "MEMORY",
@@ -173,8 +172,6 @@ fn manager_choice(text: &str) -> Result<ManagerChoice, String> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reads {
     pub(crate) board: bool,
-    /// Whether the memory of an emulated board can be named: a served board keeps it in a file.
-    pub(crate) emulated_memory: bool,
     pub(crate) manager: bool,
     /// Whether the accelerator of an emulated board can be chosen.
     pub(crate) accelerator: bool,
@@ -193,8 +190,8 @@ impl CommonOptions {
             given => given,
         };
         let board = board.unwrap_or(BoardName::Auto);
-        let real = board != BoardName::Emulated;
-        let named = match reads.board && (real || reads.emulated_memory) && memory.is_none() {
+        let real = !matches!(board, BoardName::Emulated | BoardName::Socket(_));
+        let named = match reads.board && real && memory.is_none() {
             true => instead_of("--memory", MEMORY, &variable, memory_choice)?,
             false => None,
         };

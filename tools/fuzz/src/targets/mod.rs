@@ -23,8 +23,6 @@ pub struct Target {
     pub run: fn(&[u8]) -> Tally,
     /// Bytes of an input, at most.
     pub longest: usize,
-    /// Its share of executions, relative to the other targets.
-    pub share: u32,
 }
 
 /// Every target.
@@ -35,7 +33,6 @@ pub const ALL: &[Target] = &[
                 buffers, read-only buffers stay unchanged, and time goes on",
         run: registers::run,
         longest: 256,
-        share: 280,
     },
     Target {
         name: "chains",
@@ -43,7 +40,6 @@ pub const ALL: &[Target] = &[
                 outside the grants, and none without a request",
         run: chains::run,
         longest: 512,
-        share: 24,
     },
     Target {
         name: "packets",
@@ -51,7 +47,6 @@ pub const ALL: &[Target] = &[
                 a reset the undamaged step has the bits of a fresh board",
         run: packets::run,
         longest: 192,
-        share: 4,
     },
     Target {
         name: "folders",
@@ -59,7 +54,6 @@ pub const ALL: &[Target] = &[
                 equals the files",
         run: folders::run,
         longest: 256,
-        share: 88,
     },
     Target {
         name: "confinement",
@@ -67,7 +61,6 @@ pub const ALL: &[Target] = &[
                 step, a refused step changes no body, every layout has the same bits",
         run: confinement::run,
         longest: 768,
-        share: 4,
     },
     Target {
         name: "faults",
@@ -75,7 +68,6 @@ pub const ALL: &[Target] = &[
                 without faults, or with an error that changed nothing, and the next one works",
         run: faults::run,
         longest: 320,
-        share: 1,
     },
 ];
 

@@ -7,8 +7,8 @@ use bitstream_model::interface::address_map::{
 };
 use zynq_pgs::{Caching, MemoryChoice};
 
-const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE], \
-                        devmem[:ADDRESS+BYTES] or file:PATH";
+const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE] \
+                        or devmem[:ADDRESS+BYTES]";
 
 /// Parses a choice of memory.
 pub(crate) fn memory_choice(text: &str) -> Result<MemoryChoice, String> {
@@ -35,7 +35,7 @@ pub(crate) fn memory_choice(text: &str) -> Result<MemoryChoice, String> {
             Ok(MemoryChoice::UDmaBuf { name: name.to_owned(), caching })
         }
         ("uio", node) => Ok(MemoryChoice::Uio { node: node.unwrap_or(UIO_MEMORY_NODE).to_owned() }),
-        ("file", Some(path)) => Ok(MemoryChoice::File { path: path.into() }),
+        ("file", _) => Err("a served board brings its memory: leave out the choice".to_owned()),
         ("devmem", None) => {
             Ok(MemoryChoice::DevMem { window: MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES })
         }
@@ -95,6 +95,7 @@ mod tests {
             "devmem:0x1000+0",
             "devmem:0xffffffffffffffff+2",
             "devmem:-1+2",
+            "file:/dev/shm/board",
         ] {
             memory_choice(wrong).expect_err(wrong);
         }

@@ -1,13 +1,11 @@
 //! The verb `serve`: runs an emulated board as a process of its own.
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
-use bitstream_model::interface::message::MEMORY_SUFFIX;
-use bitstream_model::remote::{Ended, MemoryFile, MemoryFileError, ServeError, Server, Visit};
+use bitstream_model::remote::{Ended, ServeError, Server, Visit};
 use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
@@ -25,28 +23,31 @@ const EXAMPLES: &str = "\
 Examples:
   pgs serve --socket /tmp/board                   in one terminal
   pgs --board socket:/tmp/board                   in another
-  pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
+  pgs serve --socket /tmp/board --memory-mib 256 --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
 Examples with the Verilog in simulation (docs/bitstream.md):
   pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
-One driver at a time has the board; a connection that says nothing for 5 s is closed. A killed
-driver leaves the engines running, and the next driver resets them. Ctrl-C ends the server and
-removes the socket; the memory's file stays.";
+One driver at a time has the board, with new memory of its own; a connection that says nothing for
+5 s is closed. A killed driver leaves the engines running, and the next driver resets them. Ctrl-C
+ends the server and removes the socket.";
 
-/// Serve an emulated board to drivers in other processes: registers at a Unix socket, memory in a
-/// file.
+/// Serve an emulated board to drivers in other processes, at a Unix socket.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
-    /// Unix socket to create. The memory is the file with ".memory" appended to this name, unless
-    /// --memory names another.
+    /// Unix socket to create; who may write to it may drive the board.
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: PathBuf,
-    /// Length of the memory, MiB [default: the length of the file; 64 for a new file]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
-    memory_mib: Option<u64>,
+    /// Length of each driver's memory, MiB
+    #[arg(
+        long,
+        value_name = "MIB",
+        default_value_t = MEMORY_BYTES >> 20,
+        value_parser = clap::value_parser!(u64).range(1..=1024)
+    )]
+    memory_mib: u64,
     #[command(flatten)]
     build: BuildArgs,
     #[command(flatten)]
@@ -72,40 +73,29 @@ pub(crate) fn run(
         let error = "`pgs serve` serves an emulated board, and no other";
         return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
     }
-    let path = match &common.memory {
-        MemoryChoice::Automatic => {
-            let mut path = args.socket.clone().into_os_string();
-            path.push(MEMORY_SUFFIX);
-            path.into()
-        }
-        MemoryChoice::File { path } => path.clone(),
-        _ => {
-            let error = "the memory of a served board is a file";
-            return Err(Failure::input(error).next("write --memory file:PATH, or leave it out"));
-        }
-    };
+    if common.memory != MemoryChoice::Automatic && !common.memory_of_environment {
+        let error = "a served board has memory of its own";
+        return Err(Failure::input(error).next("leave out --memory; --memory-mib is its length"));
+    }
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.build.build().config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
-    let wanted = args.memory_mib.map(|mib| mib << 20);
-    let made = !path.exists();
-    let memory = MemoryFile::open(&path, MEMORY_BASE, wanted, MEMORY_BYTES).map_err(no_memory)?;
-    let addresses = memory.addresses();
-    let mut server = Server::bind(config, memory, &args.socket, accelerator).map_err(|error| {
-        let removed = if made { fs::remove_file(&path) } else { Ok(()) };
-        if let Err(error) = removed {
-            log::warn!("{} stays: {error}", path.display());
-        }
-        match error {
+    let bytes = args.memory_mib << 20;
+    let memory = MEMORY_BASE..MEMORY_BASE + bytes;
+    let mut server =
+        Server::bind(config, memory, &args.socket, accelerator).map_err(|error| match error {
             ServeError::Config(error) => not_built(error),
+            ServeError::Memory(error) => Failure::input(error).next(
+                "give a smaller --memory-mib, free memory, or raise the limit of the container \
+                 (docker run --memory)",
+            ),
             error @ ServeError::Socket { .. } => Failure::input(error).next(
                 "name a socket with --socket whose folder is there and may be written to, and whose \
                  path has at most 107 bytes",
             ),
             error => Failure::input(error),
-        }
-    })?;
+        })?;
     if let Some(plan) = &planned {
         server.board().inject(plan.clone());
     }
@@ -121,8 +111,8 @@ pub(crate) fn run(
         if let Some(plan) = &planned {
             writeln!(out, "faults     {plan}")?;
         }
-        let bytes = grouped(addresses.end - addresses.start);
-        writeln!(out, "memory     {}, {bytes} bytes at {:#x}", path.display(), addresses.start)?;
+        let bytes = grouped(bytes);
+        writeln!(out, "memory     {bytes} bytes at {MEMORY_BASE:#x}, new for each driver")?;
         writeln!(out, "serving    pgs --board socket:{}", args.socket.display())?;
         out.flush()?;
     }
@@ -183,19 +173,6 @@ pub(crate) fn run(
             Err(Failure::new(Cause::Hardware, reason).next(next))
         }
         None => Ok(Verdict::Done),
-    }
-}
-
-/// There is no memory for the board.
-fn no_memory(error: MemoryFileError) -> Failure {
-    let no_room = matches!(error, MemoryFileError::NoRoom { .. });
-    let failure = Failure::input(error);
-    match no_room {
-        true => failure.next(
-            "give a smaller --memory-mib, make room, or name another file with --memory file:PATH; \
-             a container's /dev/shm is as large as its --shm-size says",
-        ),
-        false => failure,
     }
 }
 

@@ -240,7 +240,7 @@ fn shell(command: &str, folder: &Path) -> Command {
     let path = std::env::var("PATH").unwrap_or_default();
     let limit = if IN_SMALL { "120" } else { "7200" };
     let mut shell = Command::new("timeout");
-    let command = command.replace(SOCKET, "board").replace("/dev/shm/board", "memory");
+    let command = command.replace(SOCKET, "board");
     shell.args([limit, "sh", "-c", &format!("exec env {command}")]).current_dir(folder);
     shell.env("PATH", format!("{}:{path}", binaries.display())).env("PGS_BOARD", "auto");
     shell
@@ -275,14 +275,9 @@ fn serve(example: &Example, clients: &[&Example]) {
     let serving = lines.any(|line| line.is_ok_and(|line| line.starts_with("serving ")));
     assert!(serving, "{example}");
     for client in clients {
-        // The server's faults and its place of the memory are the driver's, too.
-        let mut command = client.command.clone();
-        if let Some(memory) = words(&example.command).iter().find(|word| word.starts_with("file:"))
-        {
-            command += &format!(" --memory {memory}");
-        }
+        // The server's faults are the driver's, too.
         let fault = if example.command.contains("--fault ") { " # --fault " } else { "" };
-        run_one(client, &(in_small(&command).expect("a run") + fault), folder.path());
+        run_one(client, &(in_small(&client.command).expect("a run") + fault), folder.path());
     }
     signal("-TERM", server.0.id());
     let code = server.0.wait().expect("it ends").code();
