@@ -32,16 +32,16 @@ fn scene(cubes: u16) -> (Vec<Body>, Vec<Collision>) {
 }
 
 /// A board served by another thread.
-struct Served {
+pub(crate) struct Served {
     folder: tempfile::TempDir,
-    board: EmulatedBoard,
+    pub(crate) board: EmulatedBoard,
     stopper: Stopper,
     visits: Receiver<Visit>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Served {
-    fn new(config: BoardConfig) -> Self {
+    pub(crate) fn new(config: BoardConfig) -> Self {
         Self::with(config, None)
     }
 
@@ -68,7 +68,7 @@ impl Served {
         at(&self.socket())
     }
 
-    fn open(&self) -> Accelerator {
+    pub(crate) fn open(&self) -> Accelerator {
         let mut accelerator = Accelerator::open(self.options()).expect("a board that opens");
         let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
         accelerator.set_shapes(&shapes).expect("shapes that fit");
@@ -80,7 +80,7 @@ impl Served {
         self.visits.recv().expect("a visit that ended")
     }
 
-    fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.stopper.stop();
         self.thread.take().expect("stopped once").join().expect("no panic");
     }
@@ -646,6 +646,8 @@ fn who_says_hello_and_no_more_loses_the_board_in_seconds_and_keeps_nobody_waitin
             if *socket == served.socket()),
         "{error}"
     );
+    let source = std::error::Error::source(&error).expect("a cause").to_string();
+    assert!(source.contains("Two worlds on one board"), "{source}");
     assert!(started.elapsed() < NOTICE_LIMIT, "{:?}", started.elapsed());
     mute.set_read_timeout(Some(NOTICE_LIMIT)).expect("set");
     assert_eq!(mute.read(&mut [0]).expect("hung up in time"), 0);

@@ -12,6 +12,7 @@
 use std::sync::Arc;
 
 use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_support::Process;
 
 use crate::platform::{
     Access, DmaMemory, Platform, PlatformError, SharedMemory, acquire_from_device,
@@ -49,6 +50,7 @@ struct Allocation {
     address: u64,
     bytes: u64,
     owner: Owner,
+    process: Process,
 }
 
 impl Allocation {
@@ -58,7 +60,8 @@ impl Allocation {
         bytes: u64,
         address_width: u32,
     ) -> Result<Self, PlatformError> {
-        let this = Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
+        let platform = Arc::clone(platform);
+        let this = Self { platform, address, bytes, owner: Owner::Cpu, process: Process::this() };
         let reachable = match 1u64.checked_shl(address_width) {
             Some(end) => address.checked_add(bytes).is_some_and(|last| last <= end),
             None => address.checked_add(bytes).is_some(),
@@ -79,6 +82,10 @@ impl Allocation {
 
 impl Drop for Allocation {
     fn drop(&mut self) {
+        if !self.process.is_this() {
+            // A forked child: the board's memory is its parent's, and a lock on it may be held.
+            return;
+        }
         let Self { address, bytes, .. } = *self;
         match self.owner {
             Owner::Cpu => {
