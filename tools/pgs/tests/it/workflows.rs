@@ -39,8 +39,10 @@ fn every_action_is_named_by_its_commit_and_its_version() {
     for workflow in WORKFLOWS {
         for line in text(workflow).lines() {
             let Some((_, action)) = line.split_once("uses: ") else { continue };
-            let (commit, version) =
-                action.split_once('@').and_then(|(_, commit)| commit.split_once(" # v")).expect(line);
+            let (commit, version) = action
+                .split_once('@')
+                .and_then(|(_, commit)| commit.split_once(" # v"))
+                .expect(line);
             assert!(commit.len() == 40 && commit.chars().all(|c| c.is_ascii_hexdigit()), "{line}");
             assert_eq!(version.split('.').filter(|part| part.parse::<u32>().is_ok()).count(), 3);
             actions += 1;
