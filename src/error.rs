@@ -196,6 +196,12 @@ pub enum OpenError {
     /// The bitstream is not one for this driver.
     #[error(transparent)]
     Identity(#[from] IdentityError),
+    /// The capabilities changed while the board was opened.
+    #[error(
+        "the capabilities have changed while the board was opened: was another bitstream loaded, or \
+         the power lost? open it again, with nobody loading one"
+    )]
+    OtherBitstream,
     /// A DMA core did not follow.
     #[error(transparent)]
     Core(#[from] DmaError),

@@ -1,5 +1,5 @@
 //! Tests that the device trees agree with the interface: regions, sizes, names, interrupt, clock,
-//! ports. Buffers lie where every DMA core reaches them. The udev rule names every node and gives
+//! ports. Buffers lie in the one segment that every DMA core reaches. The udev rule names every node and gives
 //! rights to its group alone.
 
 #[path = "device_tree/mod.rs"]
@@ -9,7 +9,10 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use device_tree::{Tree, sources, tools_found};
+use rtlgen::design::{Design, Parameters};
+use zynq_pgs::DevMemWindows;
 use zynq_pgs::interface::address_map;
+use zynq_pgs::interface::fence::Fence;
 use zynq_pgs::interface::profile::{FLOAT, PROFILES, Profile};
 use zynq_pgs::interface::usr_access::PL_CLOCK_MHZ;
 
@@ -231,59 +234,69 @@ fn labelled(tree: &Tree, label: &str) -> String {
     tree.strings("/__symbols__", label).expect("a label").concat()
 }
 
-/// The one region of a node. It lies in memory, and every DMA core reaches it.
-fn low_region(tree: &Tree, node: &str) -> (u64, u64) {
-    let regions = tree.regions(node).expect("a region");
-    let [(start, bytes)] = regions[..] else { panic!("{node}: {regions:x?}") };
-    assert!(start + bytes <= address_map::DDR_LOW.end, "{node}: {start:#x}, {bytes:#x} bytes");
-    assert_eq!((start | bytes) % (2 << 20), 0, "{node}: whole pages of 2 MiB");
-    (start, bytes)
-}
-
+/// The tree reserves the segment that the numbers for the Vivado script give to every DMA master, the
+/// constants are the same, and the guard begins where it ends.
 #[test]
-fn the_carve_out_is_what_its_uio_node_exposes() {
+fn the_tree_the_constants_and_the_script_have_one_segment_and_a_guard_behind_it() {
+    let fence = Fence::default();
+    let numbers = rtlgen::emit::files(&Design::new(Parameters::default()));
+    let numbers = numbers.iter().find(|file| file.name == "pgs_vivado.tcl").expect("the numbers");
+    let of_script = format!("set pgs(memory) {{0x{:X} 0x{:X}}}\n", fence.base(), fence.bytes());
+    assert!(numbers.text.contains(&of_script), "{}", numbers.text);
+    let script =
+        fs::read_to_string(sources().join("../tools/vivado/zcu102.tcl")).expect("the script");
+    let places = script.lines().filter(|line| line.contains("{*}$pgs(memory)"));
+    assert_eq!(places.count(), 1, "the script gives a master this segment at one place");
+    let constants = (address_map::MEMORY_BASE, address_map::MEMORY_BYTES);
+    assert_eq!((fence.base(), fence.bytes()), constants);
+    let windows = DevMemWindows::default().memory;
+    assert_eq!((windows.start, windows.end), (fence.base(), fence.end()));
     if !tools_found() {
         return;
     }
     let tree = Tree::with_included("zynq-pgs-memory.dtsi", "");
-    let (memory, node) = (labelled(&tree, "pgs_carve_out"), labelled(&tree, "pgs_memory"));
-    assert!(memory.starts_with("/reserved-memory/"), "{memory}");
-    assert!(tree.properties(&memory).contains(&"no-map".to_owned()));
-    let region = low_region(&tree, &memory);
-    check_node(&tree, &node, "pgs-memory", &[("memory", region.0, region.1)], false)
-        .expect("the carve-out");
-    assert!(enabled(&tree, &memory) && enabled(&tree, &node));
-    for label in ["pgs_pool", "pgs_buffer"] {
-        assert!(!enabled(&tree, &labelled(&tree, label)), "{label}: only one way is on");
+    let guard = fence.guard().expect("memory behind it");
+    let guard = (guard.start, guard.end - guard.start);
+    for (reserved, node, name, map, region) in [
+        ("pgs_reserved", "pgs_memory", address_map::UIO_MEMORY_NODE, "memory", constants),
+        // Not named as memory: `pgs list` must not offer it.
+        ("pgs_reserved_guard", "pgs_guard", address_map::UIO_GUARD_NODE, "guard", guard),
+    ] {
+        let (reserved, node) = (labelled(&tree, reserved), labelled(&tree, node));
+        assert!(reserved.starts_with("/reserved-memory/"), "{reserved}");
+        assert_eq!(tree.regions(&reserved), Some(vec![region]), "{reserved}");
+        assert!(tree.properties(&reserved).contains(&"no-map".to_owned()), "{reserved}");
+        check_node(&tree, &node, name, &[(map, region.0, region.1)], false).expect(name);
+        assert!(enabled(&tree, &reserved) && enabled(&tree, &node), "{node}");
     }
+    assert!(!enabled(&tree, &labelled(&tree, "pgs_buffer")), "only one way is on");
 }
 
 #[test]
-fn the_pool_takes_over_with_the_lines_that_the_file_shows() {
+fn the_pool_takes_the_same_place_with_the_lines_that_the_file_shows() {
     if !tools_found() {
         return;
     }
     let source = fs::read_to_string(sources().join("zynq-pgs-memory.dtsi")).expect("the source");
     let lines: Vec<_> =
         source.lines().filter_map(|line| line.strip_prefix(" *\t")).map(str::trim).collect();
-    assert_eq!(lines.len(), 4, "{lines:?}");
+    assert_eq!(lines.len(), 3, "{lines:?}");
     let tree = Tree::with_included("zynq-pgs-memory.dtsi", &lines.join("\n"));
-    let (pool, buffer) = (labelled(&tree, "pgs_pool"), labelled(&tree, "pgs_buffer"));
+    let (pool, buffer) = (labelled(&tree, "pgs_reserved"), labelled(&tree, "pgs_buffer"));
     assert!(enabled(&tree, &pool) && enabled(&tree, &buffer));
-    for label in ["pgs_carve_out", "pgs_memory"] {
-        assert!(!enabled(&tree, &labelled(&tree, label)), "{label}: only one way is on");
-    }
-    let region = low_region(&tree, &pool);
-    assert!(tree.properties(&pool).contains(&"reusable".to_owned()));
+    assert!(!enabled(&tree, &labelled(&tree, "pgs_memory")), "only one way is on");
+    assert!(enabled(&tree, &labelled(&tree, "pgs_guard")), "the guard serves both ways");
+    let fence = Fence::default();
+    assert_eq!(tree.regions(&pool), Some(vec![(fence.base(), fence.bytes())]));
+    let properties = tree.properties(&pool);
+    let has = |name: &str| properties.iter().any(|property| property == name);
+    assert!(has("reusable") && !has("no-map"), "{properties:?}");
     assert_eq!(tree.strings(&pool, "compatible"), Some(vec!["shared-dma-pool".to_owned()]));
-    let carve_out = low_region(&tree, &labelled(&tree, "pgs_carve_out"));
-    let apart = region.0 >= carve_out.0 + carve_out.1 || carve_out.0 >= region.0 + region.1;
-    assert!(apart, "{region:x?} and {carve_out:x?} overlap");
 
     assert_eq!(tree.cells(&buffer, "memory-region"), tree.cells(&pool, "phandle"));
-    assert_eq!(tree.strings(&buffer, "device-name"), Some(vec![address_map::UIO_NODE.to_owned()]));
+    assert_eq!(tree.strings(&buffer, "device-name"), Some(vec![address_map::U_DMA_BUF.to_owned()]));
     assert_eq!(tree.strings(&buffer, "compatible"), Some(vec!["ikwzm,u-dma-buf".to_owned()]));
-    assert_eq!(tree.cells(&buffer, "size").map(|size| u64::from(size[0])), Some(region.1));
+    assert_eq!(tree.cells(&buffer, "size").map(|size| u64::from(size[0])), Some(fence.bytes()));
 }
 
 /// The names that a udev pattern of alternatives and ranges of one digit matches.
@@ -323,7 +336,8 @@ fn the_udev_rule_names_every_node_and_gives_rights_to_the_group_only() {
     let [uio] = of("uio")[..] else { panic!("one rule for UIO nodes: {text}") };
     let node = address_map::UIO_NODE;
     let maps = interface().into_iter().map(|(map, _, _)| format!("{node}-{map}"));
-    let expected: BTreeSet<_> = maps.chain([node.to_owned(), format!("{node}-memory")]).collect();
+    let memory = [address_map::UIO_MEMORY_NODE, address_map::UIO_GUARD_NODE].map(str::to_owned);
+    let expected: BTreeSet<_> = maps.chain([node.to_owned()]).chain(memory).collect();
     assert_eq!(names(rule_value(uio, "ATTR{name}==").expect("by name")), expected);
     let buffers = of("u-dma-buf|udmabuf");
     assert_eq!(buffers.len() + 1, rules.len(), "{text}");

@@ -39,7 +39,7 @@ impl EmulatedBoard {
     /// [`ConfigError`] if a number is outside its range.
     pub fn new(config: BoardConfig) -> Result<Self, ConfigError> {
         config.check()?;
-        Ok(Self::of(config, Memory::new(config.address_width, config.quirks.coherency), None))
+        Ok(Self::of(config, Memory::of(&config), None))
     }
 
     /// Builds a board on external memory, around another accelerator if there is one. The device may
@@ -67,8 +67,7 @@ impl EmulatedBoard {
         accelerator: Box<dyn ExternalAccelerator>,
     ) -> Result<Self, ConfigError> {
         config.check()?;
-        let memory = Memory::new(config.address_width, config.quirks.coherency);
-        Ok(Self::of(config, memory, Some(accelerator)))
+        Ok(Self::of(config, Memory::of(&config), Some(accelerator)))
     }
 
     fn of(
@@ -231,6 +230,32 @@ impl CpuPort {
     /// [`MemoryError::Exhausted`] if there is no room below the DMA's address limit.
     pub fn allocate_shared(&self, words: usize) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
         with_board(&self.0, |board| board.memory.allocate_shared(words))
+    }
+
+    /// The guard: memory behind the fence, which the device tree reserves for a test of the fence.
+    /// `None` on a board without a fence or without a guard.
+    #[must_use]
+    pub fn guard(&self) -> Option<Range<u64>> {
+        with_board(&self.0, |board| board.memory.guard())
+    }
+
+    /// As [`allocate`](Self::allocate), in the guard, which holds one buffer or ring at a time.
+    ///
+    /// # Errors
+    /// [`MemoryError::Exhausted`] if there is no guard, or no room in it.
+    pub fn allocate_guard(&self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
+        with_board(&self.0, |board| board.memory.allocate_guard(beats))
+    }
+
+    /// As [`allocate_shared`](Self::allocate_shared), in the guard.
+    ///
+    /// # Errors
+    /// As for [`allocate_guard`](Self::allocate_guard).
+    pub fn allocate_guard_shared(
+        &self,
+        words: usize,
+    ) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
+        with_board(&self.0, |board| board.memory.allocate_guard_shared(words))
     }
 
     /// Moves a buffer to the device.

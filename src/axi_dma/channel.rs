@@ -77,19 +77,26 @@ impl Channel {
         self.write(&DMASR, status.interrupts());
     }
 
+    fn read_address(&self, low: &Register, high: &Register) -> u64 {
+        let upper = if self.address_width > 32 { self.read(high) } else { 0 };
+        (u64::from(upper) << 32) | u64::from(self.read(low))
+    }
+
     /// The descriptor in work, or the one that failed.
     pub(crate) fn current_descriptor(&self) -> u64 {
-        let high = if self.address_width > 32 { self.read(&CURDESC_MSB) } else { 0 };
-        (u64::from(high) << 32) | u64::from(self.read(&CURDESC))
+        self.read_address(&CURDESC, &CURDESC_MSB)
     }
 
     /// The descriptor up to which the engine runs.
     pub(crate) fn tail_descriptor(&self) -> u64 {
-        let high = if self.address_width > 32 { self.read(&TAILDESC_MSB) } else { 0 };
-        (u64::from(high) << 32) | u64::from(self.read(&TAILDESC))
+        self.read_address(&TAILDESC, &TAILDESC_MSB)
     }
 
-    /// Starts a halted channel at a descriptor, and waits until it runs.
+    /// Starts a halted channel at a descriptor, waits until it runs, and reads CURDESC back.
+    ///
+    /// The logic may be loaded anew between any two accesses, and then has forgotten the address, or
+    /// half of it. After this check it has the address, or RS is 0 since, and a doorbell starts
+    /// nothing (PG021, DMACR bit 0: a reset clears it).
     pub(crate) fn start(
         &mut self,
         platform: &dyn Platform,
@@ -101,7 +108,12 @@ impl Channel {
         self.write_address(&CURDESC, &CURDESC_MSB, first);
         self.write(&DMACR, control.0);
         self.control = control;
-        self.wait_for(platform, "running", |status| !status.halted())
+        self.wait_for(platform, "running", |status| !status.halted())?;
+        let (expected, found) = (first.raw(), self.current_descriptor());
+        if found != expected {
+            return Err(DmaError::FirstDescriptor { channel: self.name, expected, found });
+        }
+        Ok(())
     }
 
     /// Stops the channel, and waits until it has.
@@ -182,7 +194,7 @@ mod tests {
 
     fn address() -> BusAddress {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
-        let words = SharedWords::allocate(&platform, 64, 40).expect("allocated");
+        let words = SharedWords::allocate(&platform, 64, 40.into()).expect("allocated");
         words.range(16, 16).expect("inside")
     }
 
@@ -225,6 +237,47 @@ mod tests {
         assert!(registers.with(|state| state.scripted[&0x04].is_empty()));
     }
 
+    /// The logic is loaded anew behind the first write, the second, or the start.
+    #[test]
+    fn a_channel_that_has_lost_its_first_descriptor_does_not_start() {
+        let start = |address_width, kept: [(u32, u32); 2]| {
+            let registers = FakeRegisters::default();
+            registers.with(|state| {
+                state.scripted.insert(0x34, vec![1, 0]);
+                state.kept_bits.extend(kept);
+            });
+            channel(&registers, Direction::S2mm, address_width)
+                .start(&FakePlatform::default(), address(), Dmacr::RUNNING)
+                .map_err(|error| error.to_string())
+        };
+        const ALL: u32 = u32::MAX;
+        assert_eq!(start(40, [(0x38, ALL), (0x3C, ALL)]), Ok(()));
+        for (kept, found) in [
+            ([(0x38, 0), (0x3C, ALL)], "0x800000000,"),
+            ([(0x38, ALL), (0x3C, 0)], "0x40,"),
+            ([(0x38, 0), (0x3C, 0)], "0x0,"),
+        ] {
+            let refused = start(40, kept).expect_err("lost");
+            let both = refused.contains(found) && refused.contains("0x800000040 was written");
+            assert!(both && refused.starts_with("dma1 S2MM has its first descriptor"), "{refused}");
+        }
+        assert!(start(32, [(0x38, 0), (0x3C, ALL)]).is_err());
+    }
+
+    #[test]
+    fn both_halves_of_a_descriptors_address_are_read_if_there_are_two() {
+        let registers = FakeRegisters::default();
+        registers.with(|state| {
+            state.values.extend([(0x38, 0x40), (0x3C, 9), (0x40, 0xFFFF_FF80), (0x44, 0xA)]);
+        });
+        let of = |address_width| {
+            let channel = channel(&registers, Direction::S2mm, address_width);
+            [channel.current_descriptor(), channel.tail_descriptor()]
+        };
+        assert_eq!(of(40), [0x9_0000_0040, 0xA_FFFF_FF80]);
+        assert_eq!(of(32), [0x40, 0xFFFF_FF80]);
+    }
+
     #[test]
     fn a_board_that_is_gone_is_said_to_be() {
         let registers = FakeRegisters::default();
@@ -247,7 +300,10 @@ mod tests {
         let mut channel = channel(&registers, Direction::Mm2s, 40);
         assert_eq!(detect_length_width(&mut channel).expect("a row of ones"), 14);
         assert_eq!(registers.with(|state| state.values[&0x28]), 0);
-        registers.with(|state| state.kept_bits.insert(0x28, 0x3FF0));
-        assert!(matches!(detect_length_width(&mut channel), Err(DmaError::NotALength { .. })));
+        for kept in [0x3FF0, 0] {
+            registers.with(|state| state.kept_bits.insert(0x28, kept));
+            let refused = detect_length_width(&mut channel);
+            assert!(matches!(refused, Err(DmaError::NotALength { found, .. }) if found == kept));
+        }
     }
 }

@@ -66,6 +66,20 @@ pub enum DmaError {
         /// The register that shows the state, decoded.
         found: String,
     },
+    /// A channel that was started does not have the descriptor that it was given. Its doorbell was
+    /// not rung: it would fetch what lies there.
+    #[error(
+        "{channel} has its first descriptor at {found:#x}, {expected:#x} was written: it was not \
+         let run; does another program use this core, or was it reset meanwhile?"
+    )]
+    FirstDescriptor {
+        /// Which channel.
+        channel: ChannelName,
+        /// Bus address that was written.
+        expected: u64,
+        /// Bus address that CURDESC shows.
+        found: u64,
+    },
     /// The core was built without scatter-gather.
     #[error(
         "{channel} was built without scatter-gather (status {found}): build the bitstream with it"

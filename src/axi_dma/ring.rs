@@ -16,7 +16,7 @@ use pgs_interface::descriptor::{CONTROL, NXTDESC, NXTDESC_MSB, STATUS, WORDS, co
 
 use super::Direction;
 use super::descriptor::{Descriptor, DescriptorStatus};
-use crate::platform::{BusAddress, Platform, PlatformError, SharedWords};
+use crate::platform::{BusAddress, Platform, PlatformError, Reach, SharedWords};
 
 /// How far the engine is with a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,10 +91,10 @@ impl Ring {
         platform: &Arc<dyn Platform>,
         direction: Direction,
         chain: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<Self, PlatformError> {
         let count = chain.max(1) + 1;
-        let words = SharedWords::allocate(platform, count * WORDS, address_width)?;
+        let words = SharedWords::allocate(platform, count * WORDS, reach)?;
         let ring = Self { words, direction, count, first: 0, used: 0, seen: (0, 0) };
         for index in 0..count {
             let next = ring.address_of((index + 1) % count)?;
@@ -123,16 +123,6 @@ impl Ring {
         self.first = (self.first + self.used) % self.count;
         self.used = 0;
         self.seen = (0, 0);
-    }
-
-    /// Forgets every chain: the engine was stopped and will start at [`Self::start`].
-    pub(crate) fn rewind(&mut self) {
-        self.first = 0;
-        self.used = 0;
-        self.seen = (0, 0);
-        for index in 0..self.count {
-            self.words.write(index * WORDS + STATUS, 0);
-        }
     }
 
     /// Appends a descriptor to the chain.
@@ -256,8 +246,8 @@ mod tests {
 
     fn ring_of(direction: Direction, chain: usize) -> (Ring, BusAddress) {
         let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
-        let ring = Ring::new(&platform, direction, chain, 40).expect("allocated");
-        let buffer = CpuBuffer::allocate(&platform, 16, 40).expect("allocated");
+        let ring = Ring::new(&platform, direction, chain, 40.into()).expect("allocated");
+        let buffer = CpuBuffer::allocate(&platform, 16, 40.into()).expect("allocated");
         let buffer = buffer.into_device(16, Access::Read).expect("handed over");
         (ring, buffer.range(0, 256).expect("inside"))
     }
@@ -289,6 +279,18 @@ mod tests {
         }
         // Four descriptors, three a chain: the spare moves one back each time.
         assert_eq!(tails, [0x80, 0x40, 0x00, 0xC0]);
+    }
+
+    #[test]
+    fn a_ring_takes_a_chain_as_long_as_it_was_asked_for() {
+        for (asked, most) in [(0, 1), (1, 1), (3, 3)] {
+            let (mut ring, address) = ring(asked);
+            assert_eq!(ring.capacity(), most);
+            for _ in 0..most {
+                ring.push(&descriptor(address));
+            }
+            assert_eq!(ring.used(), most);
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use crate::axi_dma::{Channel, ChannelName, Direction, DmaError, detect_length_width, reset_core};
 use crate::control_block::Capabilities;
 use crate::error::OpenError;
-use crate::platform::{AccessCounts, Platform, PlatformError, RegisterMap, Window};
+use crate::platform::{AccessCounts, Platform, PlatformError, Reach, RegisterMap, Window};
 
 /// The two channels of a DMA core.
 #[derive(Debug)]
@@ -58,6 +58,17 @@ pub(crate) fn check_given_width(given: Option<u32>) -> Result<(), OpenError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Refuses memory for DMA outside the fence of the bitstream, as a whole. No register is touched.
+pub(crate) fn check_memory(
+    platform: &dyn Platform,
+    capabilities: &Capabilities,
+) -> Result<(), PlatformError> {
+    let memory = platform.memory();
+    // Width is a matter of each buffer: memory may lie on both sides of 4 GiB.
+    let reach = Reach { address_width: u64::BITS, ..capabilities.reach() };
+    memory.extent().map_or(Ok(()), |(address, bytes)| reach.check(memory.name(), address, bytes))
 }
 
 /// Maps the DMA cores of a bitstream. No register is read or written.

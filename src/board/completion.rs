@@ -9,6 +9,7 @@ use super::anomalies::Anomaly;
 use super::cancellation::Cancellation;
 use super::device::{Device, Statuses};
 use super::plan::{Plan, bytes};
+use super::root_cause::control_block_reset;
 use super::symptom::Symptom;
 use crate::axi_dma::Progress;
 use crate::control_block::Counters;
@@ -60,6 +61,8 @@ impl Device {
             } else {
                 self.check_cancelled()?;
                 self.platform.pause(time);
+                // The line is masked; this tells whether the board is still there.
+                self.platform.wait_interrupt(Duration::ZERO)?;
                 false
             };
             let statuses = self.statuses();
@@ -190,9 +193,12 @@ impl Device {
             return Err(Symptom::Sticky(error));
         }
         let counters = self.control.counters(&self.capabilities);
-        // All ones: no step takes two thousand years.
-        if counters.cycles == u64::MAX {
-            return Err(gone());
+        match counters.cycles {
+            // All ones: no step takes two thousand years.
+            u64::MAX => return Err(gone()),
+            // They were read last: the other counters may be as after a reset, too.
+            0 => return Err(control_block_reset().into()),
+            _ => {}
         }
         let clock_khz = self.capabilities.clock_khz;
         self.took = (clock_khz > 0).then(|| time_of(counters.cycles, clock_khz));
@@ -230,11 +236,11 @@ impl Device {
         }
     }
 
-    /// Fails on the first status register that shows an error.
+    /// Fails on the first status register that shows an error, or a channel that a reset has halted.
     fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
-        let statuses = statuses.iter().take(self.ports().count()).enumerate();
-        for (place, status) in statuses {
-            if status.gone() || status.errors() != 0 {
+        for (place, (port, status)) in self.ports().zip(statuses).enumerate() {
+            let halted = port.running() && status.halted();
+            if status.gone() || status.errors() != 0 || halted {
                 return Err(Symptom::Status { place, status: *status });
             }
         }

@@ -8,11 +8,12 @@ use pgs_support::Process;
 
 use super::anomalies::Anomalies;
 use super::bank::{Bank, PerBank};
-use super::bring_up::{Core, check_given_width, connect, drain_interrupt};
+use super::bring_up::{Core, check_given_width, check_memory, connect, drain_interrupt};
 use super::cancellation::Cancellation;
 use super::outline::Outline;
 use super::plan::{Plan, bytes};
 use super::port::Port;
+use super::root_cause::control_block_reset;
 use super::symptom::Symptom;
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
 use crate::beat::pack::pool::PackPool;
@@ -93,9 +94,11 @@ impl Device {
     fn identify(platform: Arc<dyn Platform>, length_width: Option<u32>) -> Result<Self, OpenError> {
         let counts = Arc::<AccessCounts>::default();
         let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
-        let mut capabilities = identify(&window)?;
+        let identity = identify(&window)?;
+        check_memory(&*platform, &identity)?;
         check_given_width(length_width)?;
-        capabilities.length_width = length_width.unwrap_or(capabilities.length_width);
+        let length_width = length_width.unwrap_or(identity.length_width);
+        let capabilities = Capabilities { length_width, ..identity };
         let mut control = Control::new(window);
         let mut cores = connect(&*platform, &capabilities, &counts)?;
         for core in &mut cores {
@@ -105,7 +108,12 @@ impl Device {
         }
         control.reset(&*platform)?;
         drain_interrupt(&*platform)?;
-        Ok(Self::assemble(platform, control, capabilities, counts, cores))
+        let device = Self::assemble(platform, control, capabilities, counts, cores);
+        // Otherwise the capabilities would be of one bitstream, and the fingerprint of another.
+        if identify(device.control.window())? != identity {
+            return Err(OpenError::OtherBitstream);
+        }
+        Ok(device)
     }
 
     /// Builds the device from parts that were reset and checked.
@@ -153,13 +161,13 @@ impl Device {
     /// Makes the buffers of a bank large enough for a step. No engine works on the bank.
     pub(crate) fn reserve_buffers(&mut self, plan: &Plan, bank: Bank) -> Result<(), PlatformError> {
         self.take_back_unused(bank);
-        let width = self.capabilities.address_width;
+        let reach = self.capabilities.reach();
         for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let beats = plan.segments(channel).end();
-            port.reserve_beats(&self.platform, bank, beats, width)?;
+            port.reserve_beats(&self.platform, bank, beats, reach)?;
         }
         for (channel, port) in self.s2mm.iter_mut().enumerate() {
-            port.reserve_beats(&self.platform, bank, plan.results(channel), width)?;
+            port.reserve_beats(&self.platform, bank, plan.results(channel), reach)?;
         }
         Ok(())
     }
@@ -190,15 +198,16 @@ impl Device {
     /// Makes the rings large enough for a step. No step is in flight.
     pub(crate) fn reserve_rings(&mut self, plan: &Plan) -> Result<(), Symptom> {
         self.started = None;
-        let width = self.capabilities.address_width;
+        let reach = self.capabilities.reach();
         for core in 0..self.mm2s.len() {
             let [sent, received] = self.descriptors_of(plan, core);
             for (port, descriptors) in
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
                 if !port.ring_takes(descriptors) {
+                    self.platform.reach()?;
                     port.stop(&*self.platform)?;
-                    port.replace_ring(&self.platform, descriptors, width)?;
+                    port.replace_ring(&self.platform, descriptors, reach)?;
                 }
             }
         }
@@ -218,7 +227,7 @@ impl Device {
     }
 
     /// Descriptors of a step on both channels of a core: MM2S, S2MM.
-    fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
+    pub(super) fn descriptors_of(&self, plan: &Plan, core: usize) -> [usize; 2] {
         let received = bytes(plan.results(core)).div_ceil(u64::from(self.largest));
         let received = usize::try_from(received).unwrap_or(usize::MAX);
         [plan.descriptors(core, self.largest), received]
@@ -245,13 +254,16 @@ impl Device {
     ) -> Result<(), Symptom> {
         let largest = self.largest;
         let outline = Outline::new(plan, largest);
+        // Comes before the step's first register.
+        self.platform.reach()?;
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
+        let mut starts = false;
         for (channel, port) in self.s2mm.iter_mut().enumerate() {
             port.begin();
             port.queue(bank, 0, bytes(plan.results(channel)), largest)?;
-            port.ensure_running(&*self.platform)?;
+            starts |= port.ensure_running(&*self.platform)?;
         }
         for (channel, port) in self.mm2s.iter_mut().enumerate() {
             let segments = plan.segments(channel);
@@ -266,7 +278,11 @@ impl Device {
                 }
             }
             queue(&segments.poses)?;
-            port.ensure_running(&*self.platform)?;
+            starts |= port.ensure_running(&*self.platform)?;
+        }
+        // Arguments and shapes would be lost. Where no channel starts, a reset has halted one.
+        if starts && !self.control.is_set_up() {
+            return Err(control_block_reset().into());
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let extensions = self.capabilities.extensions;
@@ -375,6 +391,10 @@ impl Drop for Device {
     /// memory. In a forked child nothing but memory of its own is freed.
     fn drop(&mut self) {
         if self.dead || !self.process.is_this() {
+            return;
+        }
+        if let Err(error) = self.platform.reach() {
+            self.give_up(&error.into());
             return;
         }
         if self.in_flight() {

@@ -7,6 +7,7 @@ pub(crate) mod cancellation;
 mod choice_text;
 pub(crate) mod completion;
 pub(crate) mod device;
+pub(crate) mod guarded;
 pub(crate) mod open;
 pub(crate) mod outline;
 pub(crate) mod plan;
@@ -18,8 +19,9 @@ pub(crate) mod symptom;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub(crate) use bring_up::{Core, check_given_width, connect, drain_interrupt};
+pub(crate) use bring_up::{Core, check_given_width, check_memory, connect, drain_interrupt};
 pub use cancellation::Cancellation;
 pub(crate) use device::Device;
+pub(crate) use guarded::{Guarded, Master};
 pub(crate) use open::Found;
 pub use open::{BoardChoice, BoardDescription, BoardKind, OpenOptions};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::bank::{Bank, PerBank};
 use crate::axi_dma::{ChainState, Channel, Descriptor, DmaError, Dmacr, Ring, pieces};
-use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError};
+use crate::platform::{Access, CpuBuffer, DeviceBuffer, Platform, PlatformError, Reach};
 
 use pgs_interface::record::Beat;
 
@@ -41,7 +41,7 @@ impl Port {
         platform: &Arc<dyn Platform>,
         bank: Bank,
         beats: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<(), PlatformError> {
         let held = &mut self.held[bank];
         match held {
@@ -51,7 +51,7 @@ impl Port {
         // The old buffer goes first: memory for DMA is scarce.
         *held = Held::Nobody;
         let slack = (beats + beats / 4).max(1).next_multiple_of(4);
-        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, address_width)?);
+        *held = Held::Cpu(CpuBuffer::allocate(platform, slack, reach)?);
         Ok(())
     }
 
@@ -80,12 +80,17 @@ impl Port {
         &mut self,
         platform: &Arc<dyn Platform>,
         descriptors: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<(), PlatformError> {
         self.ring = None;
         let slack = descriptors.saturating_add(descriptors / 4);
-        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, address_width)?);
+        self.ring = Some(Ring::new(platform, self.channel.name().direction, slack, reach)?);
         Ok(())
+    }
+
+    /// Frees the ring of a channel that is stopped.
+    pub(crate) fn drop_ring(&mut self) {
+        self.ring = None;
     }
 
     /// Stops the channel if it runs.
@@ -174,14 +179,20 @@ impl Port {
         Ok(())
     }
 
-    /// Starts the channel at this step's chain, if it does not run yet.
-    pub(crate) fn ensure_running(&mut self, platform: &dyn Platform) -> Result<(), DmaError> {
-        if !self.running && self.ring_mut().used() > 0 {
+    /// Whether the channel was started, and neither stopped nor reset since.
+    pub(crate) fn running(&self) -> bool {
+        self.running
+    }
+
+    /// Starts the channel at this step's chain, if it does not run yet; returns whether it did.
+    pub(crate) fn ensure_running(&mut self, platform: &dyn Platform) -> Result<bool, DmaError> {
+        let starts = !self.running && self.ring_mut().used() > 0;
+        if starts {
             let first = self.ring_mut().start()?;
             self.channel.start(platform, first, self.control)?;
             self.running = true;
         }
-        Ok(())
+        Ok(starts)
     }
 
     /// Lets the engine run to the end of the chain; returns whether the chain has any descriptor.
@@ -207,9 +218,6 @@ impl Port {
     pub(crate) fn was_reset(&mut self) -> Result<(), PlatformError> {
         self.running = false;
         self.channel.was_reset();
-        if let Some(ring) = &mut self.ring {
-            ring.rewind();
-        }
         self.take_all_back()
     }
 
@@ -226,5 +234,25 @@ impl Port {
                 held @ (Held::Device(_) | Held::Nobody) => self.held[bank] = held,
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axi_dma::Direction;
+    use crate::platform::RegisterMap;
+    use crate::platform::fake::{FakePlatform, FakeRegisters};
+
+    #[test]
+    fn a_ring_takes_a_chain_of_its_exact_length_and_none_longer() {
+        let platform: Arc<dyn Platform> = Arc::new(FakePlatform::default());
+        let window = Arc::new(FakeRegisters::default().window(RegisterMap::Dma(0)));
+        let channel = Channel::new(window, 0, Direction::Mm2s, 40);
+        let mut port = Port::new(channel, Access::Read, Dmacr::RUNNING);
+        assert!(!port.ring_takes(1));
+        // A quarter is slack.
+        port.replace_ring(&platform, 8, 40.into()).expect("allocated");
+        assert_eq!([9, 10, 11].map(|length| port.ring_takes(length)), [true, true, false]);
     }
 }

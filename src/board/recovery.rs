@@ -25,7 +25,7 @@ impl Device {
             Fault::Cancelled if !self.in_flight() => Aftermath::Untouched,
             // No write to another bitstream: its registers may mean anything.
             Fault::OtherBitstream { .. } => self.give_up(&fault),
-            // Writes no longer reach the board.
+            // The registers must not be touched, or writes no longer reach the board.
             Fault::Platform(_) if self.platform.lost().is_some() => self.give_up(&fault),
             _ => match self.recover(shapes) {
                 Ok(()) => Aftermath::Ready,
@@ -102,7 +102,9 @@ impl Device {
             reserved = self.reserve_rings(plan);
         }
         reserved.map_err(|symptom| match symptom {
-            Symptom::Known(Fault::Platform(error)) => Fault::NoMemory(error).into(),
+            Symptom::Known(Fault::Platform(error)) if self.platform.lost().is_none() => {
+                Fault::NoMemory(error).into()
+            }
             other => other,
         })
     }
@@ -113,6 +115,7 @@ impl Device {
     }
 
     fn clear(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
+        self.platform.reach()?;
         self.reset()?;
         // Checked before the shapes are written and the board counts as ready.
         let found = self.control.fingerprint();
@@ -137,7 +140,7 @@ impl Device {
     }
 
     /// Gives the board up. All memory stays with the engines, which may still reach it.
-    fn give_up(&mut self, error: &Fault) -> Aftermath {
+    pub(super) fn give_up(&mut self, error: &Fault) -> Aftermath {
         log::error!("the board is given up: {error}");
         self.dead = true;
         for port in self.ports_mut() {

@@ -25,6 +25,9 @@ impl Device {
         if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {
             return (Cancelled, None);
         }
+        if let Err(error) = self.platform.reach() {
+            return (error.into(), None);
+        }
         let seen = match symptom {
             Symptom::Status { place, status } => Some((place, status)),
             _ => None,
@@ -46,8 +49,16 @@ fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
         (Some(fault @ Fault::OtherBitstream { .. }), _) => fault,
         (_, Symptom::Known(fault @ (Fault::Platform(_) | Fault::Cancelled))) => fault,
         (Some(fault), _) => fault,
-        (None, symptom) => standing(diagnosis, symptom),
+        (None, symptom) => match diagnosis.control {
+            Some(ControlState { set_up: false, .. }) => control_block_reset(),
+            _ => standing(diagnosis, symptom),
+        },
     }
+}
+
+/// The fault of an accelerator whose registers are as after a reset.
+pub(super) fn control_block_reset() -> Fault {
+    Fault::LogicReset { region: "the control block".to_owned() }
 }
 
 /// The cause that the channels and the accelerator show, or else the symptom's.
@@ -57,6 +68,7 @@ fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
         _ => None,
     };
     let found = stopped(diagnosis)
+        .or_else(|| halted(diagnosis))
         .or_else(|| failed_descriptor(diagnosis))
         .or_else(|| accelerator(diagnosis, sticky))
         .or_else(|| wrong_packet(diagnosis));
@@ -127,6 +139,12 @@ fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
         && state.packet_end.is_none();
     let failed = state.descriptor.is_some_and(|descriptor| descriptor.status.failed());
     Some(if overrun && !failed { Fault::LongPacket(at) } else { Fault::DmaInternal(at) })
+}
+
+/// The channel that a reset has halted: it was started, and no channel shows an error.
+fn halted(diagnosis: &Diagnosis) -> Option<Fault> {
+    let state = diagnosis.channels.iter().find(|state| state.started && state.status.halted())?;
+    Some(Fault::LogicReset { region: state.channel.to_string() })
 }
 
 /// The descriptor that failed while no channel shows an error.

@@ -53,6 +53,7 @@ impl Device {
             error: control.read(&ERROR),
             error_detail: control.read(&ERROR_DETAIL),
             identification: found.identification(),
+            set_up: control.is_set_up(),
             changed: self.fingerprint.difference(&found),
         }
     }
@@ -60,7 +61,7 @@ impl Device {
 
 fn channel_state(port: &Port, before: Option<Dmasr>, outline: Option<&Outline>) -> ChannelState {
     let channel = &port.channel;
-    let name = (channel.name(), channel.address_width());
+    let name = (channel.name(), channel.address_width(), port.running());
     let now = channel.status();
     // An error that was seen and has gone since is the error that the step failed with.
     let status = before.filter(|_| now.errors() == 0).unwrap_or(now);
@@ -77,7 +78,7 @@ fn channel_state(port: &Port, before: Option<Dmasr>, outline: Option<&Outline>) 
 
 /// The state of a channel, from its registers and its chain.
 fn state_of(
-    (channel, address_width): (ChannelName, u32),
+    (channel, address_width, started): (ChannelName, u32, bool),
     (control, status): (Dmacr, Dmasr),
     (current, tail): (u64, u64),
     chain: &ChainState,
@@ -105,6 +106,7 @@ fn state_of(
         bytes_moved: chain.bytes_moved,
         bytes_expected: chain.bytes_expected,
         descriptor,
+        started,
         address_width,
     }
 }

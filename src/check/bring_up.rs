@@ -9,7 +9,9 @@ use pgs_interface::profile::{Inertia, Variant};
 
 use super::report::{Line, Lines, Outcome};
 use crate::axi_dma::{DmaError, STATE_CHANGE};
-use crate::board::{Core, Device, Found, check_given_width, connect, drain_interrupt};
+use crate::board::{
+    Core, Device, Found, check_given_width, check_memory, connect, drain_interrupt,
+};
 use crate::control_block::{Capabilities, Control, ControlError, IdentityError, identify};
 use crate::error::OpenError;
 use crate::platform::{AccessCounts, RegisterMap, Window};
@@ -32,6 +34,12 @@ pub(super) fn bring_up(
     let window = Window::open(&*platform, RegisterMap::Control, &counts)?;
     let Some(mut capabilities) = identity(&window, lines) else { return Ok(None) };
 
+    if let Err(error) = check_memory(&*platform, &capabilities) {
+        let next = "reserve the memory of the fence in the device tree, or build the bitstream for \
+                    this memory (rtlgen generate --memory)";
+        lines.stop(Line::Fence, Outcome::failed(chain(&error), "memory inside the fence", next));
+        return Ok(None);
+    }
     let mut cores = match connect(&*platform, &capabilities, &counts) {
         Ok(cores) => cores,
         Err(error) => {

@@ -3,7 +3,7 @@
 //! ```text
 //! bring-up: identification, interface version, capabilities, register regions, reset,
 //!           dma mode, length register                            stops at the first failure
-//! streams:  echo, sums, coherency, interrupt                     each by itself
+//! streams:  echo, sums, coherency, interrupt, fence              each by itself
 //! ```
 //!
 //! An echo is a step without collisions and without integration: every bitstream returns poses and
@@ -11,6 +11,7 @@
 //! results with it.
 
 mod bring_up;
+mod fence;
 mod judge;
 mod pattern;
 mod report;

@@ -87,10 +87,11 @@ pub(super) enum Line {
     Sums,
     Coherency,
     Interrupt,
+    Fence,
 }
 
 impl Line {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::Identification,
         Self::Version,
         Self::Capabilities,
@@ -102,6 +103,7 @@ impl Line {
         Self::Sums,
         Self::Coherency,
         Self::Interrupt,
+        Self::Fence,
     ];
 
     const fn name(self) -> &'static str {
@@ -117,6 +119,7 @@ impl Line {
             Self::Sums => "sums",
             Self::Coherency => "coherency",
             Self::Interrupt => "interrupt",
+            Self::Fence => "fence",
         }
     }
 }

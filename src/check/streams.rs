@@ -5,10 +5,11 @@ use std::time::Duration;
 use pgs_interface::record::Beat;
 
 use super::bring_up::chain;
+use super::fence::fence;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
-use crate::axi_dma::Direction;
+use crate::axi_dma::{Direction, DmaError};
 use crate::beat::unpack::results::sum_of_words;
 use crate::board::BoardKind;
 use crate::error::Error;
@@ -46,6 +47,8 @@ pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
     lines.set(Line::Coherency, outcome);
     let outcome = interrupt(&mut accelerator).unwrap_or_else(|outcome| outcome);
     lines.set(Line::Interrupt, outcome);
+    let outcome = fence(&mut accelerator);
+    lines.set(Line::Fence, outcome);
 }
 
 /// A number of bodies for which the bitstream has room, at most `bodies`.
@@ -70,6 +73,10 @@ fn step_failed(error: &Error) -> Outcome {
             Fault::NoMemory(error) | Fault::Platform(error) => (
                 chain(error),
                 "give the board memory for DMA that its cores can reach, 1 MiB for this test",
+            ),
+            Fault::LogicReset { .. } | Fault::Core(DmaError::FirstDescriptor { .. }) => (
+                chain(fault),
+                "see that nothing else loads, resets or drives the logic meanwhile, and test again",
             ),
             fault => (
                 chain(fault),
@@ -117,6 +124,7 @@ fn echoes(accelerator: &mut Accelerator, lines: &mut Lines) -> Result<Vec<EchoRe
             short_pieces: *size <= SHORT_PIECES_UP_TO,
             fresh_buffers: true,
             filler: None,
+            guarded: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -200,6 +208,7 @@ fn coherency(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
             short_pieces: false,
             fresh_buffers: round == 0,
             filler: Some(pattern.filler()),
+            guarded: None,
         };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         let expected = pattern.results(&bodies, channels);
@@ -249,8 +258,13 @@ fn interrupt(accelerator: &mut Accelerator) -> Result<Outcome, Outcome> {
         .bodies(0x200, fitting(accelerator, COHERENCY_BODIES));
     let mut woken = 0;
     for _ in 0..INTERRUPT_STEPS {
-        let echo =
-            Echo { bodies: &bodies, short_pieces: false, fresh_buffers: false, filler: None };
+        let echo = Echo {
+            bodies: &bodies,
+            fresh_buffers: false,
+            short_pieces: false,
+            filler: None,
+            guarded: None,
+        };
         let echoed = accelerator.echo(&echo).map_err(|error| step_failed(&error))?;
         woken += u64::from(echoed.interrupts > 0);
     }

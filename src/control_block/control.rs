@@ -83,9 +83,20 @@ impl Control {
         Self { window, written: [None; ARGUMENTS] }
     }
 
+    /// Its registers.
+    pub(crate) fn window(&self) -> &Window {
+        &self.window
+    }
+
     /// Reads one register.
     pub(crate) fn read(&self, register: &Register) -> u32 {
         self.window.read32(register.offset)
+    }
+
+    /// Whether the accelerator has not been reset since [`reset`](Self::reset), which enables its
+    /// interrupt: arguments and shapes are as they were written.
+    pub(crate) fn is_set_up(&self) -> bool {
+        self.read(&GIE) & 1 != 0
     }
 
     /// Writes one word. The offset may lie in the shape table.

@@ -73,8 +73,6 @@ impl Control {
     pub(crate) fn counters(&self, capabilities: &Capabilities) -> Counters {
         let wide = |high: u32, low: u32| (u64::from(high) << 32) | u64::from(low);
         let hazards = self.read(&HAZARDS);
-        let low = self.read(&CYCLES_LO);
-        let cycles = wide(self.read(&CYCLES_HI), low);
         let work = self.read(&WORK_CYCLES);
         let waits = self.read(&WAIT_CYCLES);
         let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
@@ -82,6 +80,9 @@ impl Control {
             let low = self.read(&IMPULSE_SUM_LO);
             wide(self.read(&IMPULSE_SUM_HI), low)
         });
+        // Last: no step takes 0 cycles, so that 0 here tells of a reset at any of these reads.
+        let high = self.read(&CYCLES_HI);
+        let cycles = wide(high, self.read(&CYCLES_LO));
         let saturated = Saturated {
             work: work == COUNTER_MAX,
             waits: waits == COUNTER_MAX,

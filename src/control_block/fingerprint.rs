@@ -63,9 +63,14 @@ fn changed(((expected, found), register): ((&u32, &u32), &Register)) -> Changed 
 }
 
 impl Control {
-    /// Reads the fingerprint of the loaded bitstream.
+    /// Reads the fingerprint of the loaded bitstream, IDENTIFICATION last: it then tells of a power
+    /// that was lost, or of another bitstream that was loaded, at any of these reads.
     pub(crate) fn fingerprint(&self) -> Fingerprint {
-        Fingerprint(CONSTANTS.map(|register| self.read(register)))
+        let mut words = [0; CONSTANTS.len()];
+        for (word, register) in words.iter_mut().zip(CONSTANTS).rev() {
+            *word = self.read(register);
+        }
+        Fingerprint(words)
     }
 }
 

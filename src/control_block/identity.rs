@@ -4,19 +4,21 @@ use pgs_interface::address_map::CONTROL_BYTES;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
-    FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
-    MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION,
-    VERSION_MAJOR, WINDOW, WINDOW_CAPACITY, channels, depth, dma, features, issue,
-    memory_per_record, numbers, version, window as window_units, window_capacity,
+    FENCE_BASE, FENCE_SIZE, FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE,
+    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY,
+    SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, WINDOW, WINDOW_CAPACITY, channels, depth,
+    dma, features, issue, memory_per_record, numbers, version, window as window_units,
+    window_capacity,
 };
 use pgs_interface::extension::Extensions;
+use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Flow, Geometry, Inertia, Profile, Variant, Window as Live};
 use pgs_interface::record::live;
 use pgs_interface::register::{Field, Register};
 use thiserror::Error;
 
-use crate::platform::Window;
+use crate::platform::{Reach, Window};
 
 /// The identity and the capabilities of a bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,9 +70,17 @@ pub struct Capabilities {
     pub length_width: u32,
     /// Width of memory addresses, bits.
     pub address_width: u32,
+    /// The one address segment that the DMA cores reach; `None` if nothing but the driver confines
+    /// them.
+    pub fence: Option<Fence>,
 }
 
 impl Capabilities {
+    /// The memory that the DMA cores reach.
+    pub(crate) const fn reach(&self) -> Reach {
+        Reach { address_width: self.address_width, fence: self.fence }
+    }
+
     /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
     pub(crate) const fn streams_masses(&self, shapes: usize) -> bool {
         self.extensions.streamed_masses && shapes > self.shape_capacity as usize
@@ -191,6 +201,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         (LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&dma::LENGTH_WIDTH.of(word))
             && (32..=64).contains(&dma::ADDRESS_WIDTH.of(word))
     })?;
+    let fence = fence_of(window)?;
     let clock_khz = checked(window, &CLOCK_KHZ, "a clock above 0", |word| word > 0)?;
     let live = match profile.flow {
         Flow::Passes => None,
@@ -235,7 +246,18 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         bytes_per_collision: memory_per_record::COLLISION.of(memory),
         length_width: dma::LENGTH_WIDTH.of(widths),
         address_width: dma::ADDRESS_WIDTH.of(widths),
+        fence,
     })
+}
+
+/// Reads the fence. A bitstream of a version before 1.3 reads 0 in both registers.
+fn fence_of(window: &Window) -> Result<Option<Fence>, IdentityError> {
+    let base = window.read32(FENCE_BASE.offset);
+    let segment = |size| Fence::from_registers([base, size]);
+    let expected = "0, or a segment of the DDR that begins at FENCE_BASE: a power of two of units \
+                    of 64 KiB, at a multiple of it";
+    let size = checked(window, &FENCE_SIZE, expected, |size| segment(size).is_ok())?;
+    Ok(segment(size).unwrap_or_default())
 }
 
 /// Reads the units, places and delay lines of a design that keeps live bodies alone.
@@ -382,6 +404,17 @@ mod tests {
     }
 
     #[test]
+    fn the_fence_is_two_registers_and_a_bitstream_without_them_has_none() {
+        assert_eq!(identify_with(&[]).expect("well formed").fence, None);
+        let found = identify_with(&[(0x150, 0x5000), (0x154, 0x400)]).expect("well formed");
+        assert_eq!(found.fence, Fence::new(0x5000_0000, 64 << 20));
+        // The base alone is no fence; a fence at another place than a multiple of its length neither.
+        assert_eq!(identify_with(&[(0x150, 0x5000)]).expect("well formed").fence, None);
+        let error = identify_with(&[(0x150, 0x5001), (0x154, 0x400)]).expect_err("misplaced");
+        assert!(error.to_string().starts_with("FENCE_SIZE is 0x00000400"), "{error}");
+    }
+
+    #[test]
     fn another_design_and_another_major_version_are_refused() {
         assert!(matches!(
             identify_with(&[(0x100, 0x1234)]),
@@ -423,6 +456,9 @@ mod tests {
             (0x13C, 24, "MEMORY_PER_RECORD"),
             (0x140, (40 << 8) | 7, "DMA"),
             (0x140, (31 << 8) | 26, "DMA"),
+            // A size that no address decoder has, and a base beside it.
+            (0x154, 3, "FENCE_SIZE"),
+            (0x154, 0x8_0001, "FENCE_SIZE"),
         ];
         for (at, value, named) in cases {
             let error = identify_with(&[(at, value)]).expect_err(named).to_string();

@@ -1,6 +1,7 @@
 //! The options of a build, and the configuration that they make.
 
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{FLOAT, Inertia, Profile};
 
@@ -31,6 +32,8 @@ pub struct Build {
     pub length_width: Option<u32>,
     /// Width of DMA addresses, bits.
     pub address_width: Option<u32>,
+    /// The one address segment that the DMA masters reach.
+    pub fence: Option<Fence>,
     /// Threads of this machine for the board's arithmetic; no result depends on their number.
     /// [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) has the driver's own.
     pub threads: Option<usize>,
@@ -56,6 +59,7 @@ impl Build {
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
             length_width: self.length_width.unwrap_or(default.length_width),
             address_width: self.address_width.unwrap_or(default.address_width),
+            fence: self.fence,
             threads: self.threads.unwrap_or(default.threads),
             lanes: self.lanes.unwrap_or(default.lanes),
             ..default
@@ -109,6 +113,7 @@ impl Build {
             bandwidth: unlike(config.bandwidth, default.bandwidth),
             length_width: unlike(config.length_width, default.length_width),
             address_width: unlike(config.address_width, default.address_width),
+            fence: config.fence,
             threads: unlike(config.threads, default.threads),
             lanes: unlike(config.lanes, default.lanes),
         }

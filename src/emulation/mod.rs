@@ -27,6 +27,7 @@
 //! | `bandwidth` | memory bandwidth in GB/s, or `unlimited` | 12.8 |
 //! | `length-width` | width of the DMA length registers, bits | 26 |
 //! | `address-width` | width of DMA addresses, bits | 40 |
+//! | `fence` | the only memory that the DMA cores reach, as `0x50000000+64M` | none |
 //! | `threads` | threads of this machine for the board's arithmetic; no result depends on them | one per processor, at most 4 |
 //! | `lanes` | compute in SIMD lanes, `on` or `off`; no result depends on it | `on` |
 //!

@@ -5,7 +5,7 @@ use pgs_interface::profile::{PROFILES, Profile};
 use super::build::Build;
 use super::values::{
     FORMATS, HAZARDS, INERTIA, LANES, PRECISIONS, SUBNORMALS, address_width, bandwidth,
-    bandwidth_text, length_width, name_of, named, threads, window,
+    bandwidth_text, fence, length_width, name_of, named, threads, window,
 };
 
 /// One option of a build.
@@ -66,7 +66,7 @@ const PROFILE: BuildOption = BuildOption {
 };
 
 /// Every option, in the order of a text.
-pub(super) const OPTIONS: [BuildOption; 12] = [
+pub(super) const OPTIONS: [BuildOption; 13] = [
     PROFILE,
     choice!("format", format, FORMATS, true),
     choice!("arithmetic", arithmetic, PRECISIONS, true),
@@ -77,6 +77,7 @@ pub(super) const OPTIONS: [BuildOption; 12] = [
     number!("bandwidth", bandwidth, "GBPS|unlimited", bandwidth, bandwidth_text),
     number!("length-width", length_width, "BITS", length_width, |bits| bits.to_string()),
     number!("address-width", address_width, "BITS", address_width, |bits| bits.to_string()),
+    number!("fence", fence, "BASE+BYTES", fence, |fence| fence.to_string()),
     number!("threads", threads, "N", threads, |threads| threads.to_string()),
     choice!("lanes", lanes, LANES, false),
 ];

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use bitstream_model::{Bandwidth, EmulatedBoard, Hazards, Subnormals};
+use pgs_interface::fence::Fence;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, PROFILES, Profile};
 use proptest::prelude::*;
@@ -25,6 +26,7 @@ fn a_build_is_written_as_it_is_read() {
         "half,f32,unchecked,world",
         "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
+        "float,fence=0x40000000+512M",
         "mixed,bandwidth=17.07,threads=1,lanes=off",
     ] {
         let build = build(text).expect(text);
@@ -42,7 +44,7 @@ fn words_may_stand_in_any_order() {
 #[test]
 fn a_word_means_what_the_option_means() {
     let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
-                length-width=14,address-width=32,threads=3,lanes=off";
+                length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
     let expected = Build {
         profile: Profile::by_name("half"),
         format: Some(StreamFormat::Binary16),
@@ -54,6 +56,7 @@ fn a_word_means_what_the_option_means() {
         bandwidth: Some(Bandwidth::Unlimited),
         length_width: Some(14),
         address_width: Some(32),
+        fence: Some(Fence::default()),
         threads: Some(3),
         lanes: Some(false),
     };
@@ -121,6 +124,8 @@ fn any_build() -> impl Strategy<Value = Build> {
         Just(Bandwidth::Unlimited),
         (100_000_000_u64..=1_000_000_000_000).prop_map(Bandwidth::BytesPerSecond),
     ];
+    let fences = ["0x10000+64K", "0x50000000+64M", "0x800000000+2G"];
+    let fences = fences.map(|text| text.parse::<Fence>().expect(text));
     (
         prop::sample::select(PROFILES.to_vec()),
         (any_of(super::values::FORMATS.map(|(_, format)| format)), any_of(Precision::ALL)),
@@ -128,7 +133,7 @@ fn any_build() -> impl Strategy<Value = Build> {
         any_of([Hazards::Interlocked, Hazards::Unchecked]),
         any_of([Subnormals::Keep, Subnormals::Flush]),
         (prop::option::of(1..=u32::MAX), prop::option::of(rate), prop::option::of(1_usize..=31)),
-        (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64)),
+        (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64), any_of(fences)),
     )
         .prop_map(|(profile, formats, choices, hazards, subnormals, numbers, widths)| Build {
             profile: Some(profile),
@@ -143,6 +148,7 @@ fn any_build() -> impl Strategy<Value = Build> {
             threads: numbers.2,
             length_width: widths.0,
             address_width: widths.1,
+            fence: widths.2,
         })
 }
 

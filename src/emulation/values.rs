@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use bitstream_model::{Bandwidth, Hazards, Subnormals, THREADS_MAX};
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use pgs_interface::fence::{Fence, NoFence};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Inertia;
 
@@ -58,6 +59,11 @@ pub(super) fn length_width(text: &str) -> Result<u32, String> {
 /// Reads the width of an address, bits.
 pub(super) fn address_width(text: &str) -> Result<u32, String> {
     whole(text, 32, 64)
+}
+
+/// Reads a fence.
+pub(super) fn fence(text: &str) -> Result<Fence, String> {
+    text.parse().map_err(|expected: NoFence| expected.to_string())
 }
 
 fn whole<T: Copy + FromStr + PartialOrd + Display>(

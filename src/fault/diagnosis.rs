@@ -59,6 +59,8 @@ pub struct ChannelState {
     pub bytes_expected: u64,
     /// The descriptor that failed, or else the descriptor in work.
     pub descriptor: Option<DescriptorState>,
+    /// Whether the driver has started it, and neither stopped nor reset it since.
+    pub(crate) started: bool,
     /// Bits of the bus addresses in its registers.
     pub(crate) address_width: u32,
 }
@@ -75,6 +77,8 @@ pub struct ControlState {
     pub error_detail: u32,
     /// The register IDENTIFICATION.
     pub identification: u32,
+    /// Whether it has not been reset since the driver's last reset.
+    pub(crate) set_up: bool,
     /// The first identity register that differs from its value at opening.
     pub(crate) changed: Option<Changed>,
 }

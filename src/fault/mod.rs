@@ -17,9 +17,9 @@ use crate::platform::PlatformError;
 
 /// The cause of a failed step.
 ///
-/// Among several errors the fault is the one that explains the others. An error of a channel comes
-/// before an error of a descriptor, then the accelerator's own error, then a packet of a wrong
-/// length, and a deadline last.
+/// Among several errors the fault is the one that explains the others. A board that is gone, another
+/// bitstream and a reset of the logic come first, then an error of a channel, an error of a
+/// descriptor, the accelerator's own error, a packet of a wrong length, and a deadline last.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Fault {
@@ -156,6 +156,15 @@ pub enum Fault {
         /// The register region.
         region: String,
     },
+    /// The logic was reset, and not by this driver.
+    #[error(
+        "the logic was reset: {region} is as after a reset, which this driver did not ask for; was \
+         the bitstream loaded again, or the system suspended?"
+    )]
+    LogicReset {
+        /// The register region that shows it.
+        region: String,
+    },
     /// Another bitstream was loaded.
     #[error(
         "{register} reads {found:#010x}, {expected:#010x} when the board was opened: another \
@@ -222,7 +231,9 @@ impl Fault {
             Self::Gone { .. }
             | Self::Core(DmaError::Gone { .. })
             | Self::Control(ControlError::Gone) => "gone",
+            Self::LogicReset { .. } => "logic-reset",
             Self::OtherBitstream { .. } => "other-bitstream",
+            Self::Core(DmaError::FirstDescriptor { .. }) => "first-descriptor",
             Self::Core(_) => "dma-state",
             Self::Control(_) => "accelerator-state",
             Self::NoMemory(_) => "no-memory",

@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 
+use pgs_interface::fence::Fence;
 use thiserror::Error;
 
 /// Why a request to the platform failed.
@@ -36,6 +37,22 @@ pub enum PlatformError {
         bytes: u64,
         /// Width of the cores' addresses, bits.
         address_width: u32,
+    },
+    /// Memory lies outside the segment that the bitstream confines its DMA cores to.
+    #[error(
+        "{bytes} bytes at {address:#x} of the memory {region:?} lie outside the fence {fence} of the \
+         bitstream, where no DMA core reaches them: reserve the memory of the fence in the device \
+         tree, or build the bitstream for this memory with `rtlgen generate --memory`"
+    )]
+    OutsideFence {
+        /// The memory: a UIO node, a u-dma-buf, or a file.
+        region: String,
+        /// Bus address of the buffer, or of the memory as a whole.
+        address: u64,
+        /// Its length, bytes.
+        bytes: u64,
+        /// The fence.
+        fence: Fence,
     },
     /// A range does not lie inside its buffer.
     #[error("{bytes} bytes at offset {offset} do not lie in a buffer of {buffer_bytes} bytes")]
@@ -129,6 +146,20 @@ pub enum PlatformError {
         /// Which file.
         path: PathBuf,
     },
+    /// A plain file lies in the place of a device file.
+    #[error(
+        "{} is a plain file of {found} bytes, expected a device with at least {expected}: remove it, \
+         and let udev make the device file (udevadm trigger)",
+        path.display()
+    )]
+    NotADevice {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of the device's regions.
+        expected: u64,
+        /// Bytes of the file.
+        found: u64,
+    },
     /// The programmable logic is not programmed, or the kernel does not know that it is.
     #[error(
         "no bitstream is loaded as far as the kernel knows: expected \"operating\" in {}, found \
@@ -179,6 +210,15 @@ pub enum PlatformError {
         node: String,
         /// The kernel's name for it.
         device: String,
+    },
+    /// The kernel took the logic away while it was open.
+    #[error(
+        "{why} while it was open: no register is touched any more; load the bitstream and its overlay \
+         again if need be, then open the board again"
+    )]
+    Lost {
+        /// The part that went away, in words.
+        why: String,
     },
     /// An access does not lie in its region.
     #[error(

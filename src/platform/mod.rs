@@ -56,13 +56,14 @@ pub use linux::fpga::{
     FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
 };
 pub use linux::lock::DeviceLock;
-pub use linux::system::{System, UIO_CLASS, try_device};
+pub use linux::system::{System, UIO_CLASS, try_node};
 pub use linux::uio::{NodePart, UioMap, UioNode};
 pub use linux::uio_device::UioDevice;
 pub use linux::uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
 pub use linux::uio_window::UioWindow;
 pub(crate) use memory::DmaMemorySource;
-pub(crate) use memory::buffer::{BusAddress, CpuBuffer, DeviceBuffer, SharedWords};
+pub(crate) use memory::buffer::{BusAddress, CpuBuffer, DeviceBuffer, Reach, SharedWords};
+pub(crate) use memory::guard::GuardPlatform;
 pub use memory::reserved::ReservedMemory;
 pub use memory::u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
 pub(crate) use memory::volatile::{DmaMemory, SharedMemory};
@@ -91,6 +92,11 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError>;
     /// The memory for DMA.
     fn memory(&self) -> &dyn DmaMemorySource;
+    /// The guard: memory outside the fence of the bitstream, for a test of the fence alone; `None`
+    /// if none is reserved.
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
+        Ok(None)
+    }
 
     /// Time since an arbitrary moment.
     fn now(&self) -> Duration;
@@ -101,8 +107,13 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     /// Lets the interrupt through again.
     fn unmask_interrupt(&self) -> Result<(), PlatformError>;
 
-    /// Why the board cannot be reached any more, if its registers read all ones because of that.
+    /// Why the board cannot be reached any more. Its registers are then not touched, and read all
+    /// ones.
     fn lost(&self) -> Option<PlatformError> {
         None
+    }
+    /// Makes sure that the registers may still be touched.
+    fn reach(&self) -> Result<(), PlatformError> {
+        self.lost().map_or(Ok(()), Err)
     }
 }

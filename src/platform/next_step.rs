@@ -12,6 +12,9 @@ impl PlatformError {
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match self {
+            Self::File { act: "lock", path, source } if is_unsupported(source) => {
+                Some(of_lock(path))
+            }
             Self::File { path, source, .. } | Self::Permission { path, source } => {
                 Some(of_file(path, source))
             }
@@ -100,6 +103,30 @@ fn of_file(path: &Path, source: &io::Error) -> String {
             format!("{path} is on a file system that cannot do it: is it a device file?")
         }
         _ => "look for the cause in the kernel's log: dmesg | tail".to_owned(),
+    }
+}
+
+/// Whether the kernel cannot do it for any file there.
+fn is_unsupported(source: &io::Error) -> bool {
+    matches!(errno(source), Some(Errno::ENOLCK | Errno::ENOSYS | Errno::EOPNOTSUPP))
+}
+
+/// After a lock that the file system, or a sandbox, does not give.
+fn of_lock(path: &Path) -> String {
+    let shared_memory = Path::new("/dev/shm");
+    let device = path.starts_with("/dev") && !path.starts_with(shared_memory);
+    let path = path.display();
+    let lacks = format!("the file system of {path} has no locks (as NFS without its lock service)");
+    if device {
+        format!(
+            "{lacks}, or a sandbox refuses flock: take the device file that udev makes; in a \
+             container, give it the device (docker run --device {path})"
+        )
+    } else {
+        let other = shared_memory.join("pgs").display().to_string();
+        format!(
+            "{lacks}: serve the board with its memory elsewhere, and name it: --memory file:{other}"
+        )
     }
 }
 
@@ -256,6 +283,22 @@ mod tests {
         }
         let different: BTreeSet<_> = errnos.iter().map(|(errno, _)| next(&file(*errno))).collect();
         assert_eq!(different.len(), errnos.len());
+    }
+
+    #[test]
+    fn a_lock_that_the_file_system_lacks_is_told_by_what_the_file_is() {
+        for (path, text) in [
+            ("/dev/uio0", "--device /dev/uio0"),
+            ("/dev/shm/board.memory", "--memory file:/dev/shm/pgs"),
+            ("/home/nfs/board.memory", "--memory file:/dev/shm/pgs"),
+        ] {
+            for errno in [Errno::ENOLCK, Errno::EOPNOTSUPP, Errno::ENOSYS] {
+                let source = errno.into();
+                let next = next(&PlatformError::File { act: "lock", path: path.into(), source });
+                assert!(next.contains(text) && next.contains("has no locks"), "{errno}: {next}");
+                assert!(next.contains(path) && !next.contains("is it a device file"), "{next}");
+            }
+        }
     }
 
     #[test]

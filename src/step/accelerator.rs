@@ -136,11 +136,15 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
-    /// stay. [`Error::MustReopen`] after a fault that could not be cleared.
+    /// stay. [`Error::Step`]: the board went away. [`Error::MustReopen`] after a fault that could not
+    /// be cleared.
     pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
         standard(|| {
             self.settle()?;
             validate_shapes(shapes, &self.limits)?;
+            if let Err(error) = self.device.platform.reach() {
+                return Err(self.device.fail(error.into(), &self.shapes));
+            }
             self.device.load_shapes(shapes);
             self.shapes_loaded += 1;
             self.shapes.clear();

@@ -12,11 +12,12 @@ use super::packing::PackInput;
 use super::results::received;
 use crate::axi_dma::{Direction, largest_piece};
 use crate::beat::stripe::{Place, Segment};
+use crate::board::Guarded;
 use crate::board::plan::{Plan, bytes};
 use crate::board::symptom::Symptom;
 use crate::error::Error;
 use crate::order::{Ordered, Schedule};
-use crate::platform::{Deadline, PlatformError};
+use crate::platform::{Deadline, GuardPlatform, PlatformError};
 use crate::scene::{Body, Collision, Passes, StepParameters};
 
 /// Time limit of an echo. The driver polls without an interrupt after a quarter of it.
@@ -36,6 +37,8 @@ pub(crate) struct Echo<'a> {
     pub(crate) fresh_buffers: bool,
     /// The pattern to write over all buffers first.
     pub(crate) filler: Option<FillPattern>,
+    /// The master whose memory lies in the guard.
+    pub(crate) guarded: Option<Guarded<'a>>,
 }
 
 /// The results and counters of an echo.
@@ -63,7 +66,11 @@ impl Accelerator {
         }
         let echoed = self.run_echo(echo);
         self.device.largest = largest;
-        echoed.map_err(|fault| self.device.fail(fault, &self.shapes))
+        let echoed = echoed.map_err(|fault| self.device.fail(fault, &self.shapes));
+        if let Some(guarded) = &echo.guarded {
+            self.device.leave_guard(guarded, self.bank);
+        }
+        echoed
     }
 
     fn run_echo(&mut self, echo: &Echo<'_>) -> Result<EchoResult, Symptom> {
@@ -74,6 +81,9 @@ impl Accelerator {
             self.device.release_buffers(bank);
         }
         self.device.reserve_or_reset(&plan, bank, &self.shapes)?;
+        if let Some(guarded) = &echo.guarded {
+            self.device.move_to_guard(guarded, &plan, bank)?;
+        }
         if let Some(filler) = echo.filler {
             let sides = [
                 (Direction::Mm2s, &mut self.device.mm2s),
@@ -121,6 +131,11 @@ impl Accelerator {
             interrupts,
             descriptors: self.device.descriptors(),
         })
+    }
+
+    /// The guard behind the fence, if one is reserved.
+    pub(crate) fn guard(&self) -> Result<Option<GuardPlatform>, PlatformError> {
+        GuardPlatform::of(&self.device.platform)
     }
 
     /// Whether an interrupt comes within `timeout`. Unmasks the interrupt afterwards.

@@ -2,16 +2,17 @@
 
 #![cfg(feature = "emulation")]
 
+use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{HALF, Inertia, MIXED, PROFILES, WINDOWED};
 use bitstream_model::{
-    BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Quirks, Resettable,
+    BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Master, Quirks, Resettable,
 };
 use zynq_pgs::{
     Accelerator, BoardChoice, CheckReport, Error, OpenError, OpenOptions, Outcome, check,
 };
 
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 12] = [
     "identification",
     "interface version",
     "capabilities",
@@ -23,7 +24,13 @@ const NAMES: [&str; 11] = [
     "sums",
     "coherency",
     "interrupt",
+    "fence",
 ];
+
+/// A board with a fence.
+fn fenced() -> BoardConfig {
+    BoardConfig { fence: Some(Fence::default()), ..BoardConfig::default() }
+}
 
 fn checked(config: BoardConfig) -> (CheckReport, EmulatedBoard) {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
@@ -45,7 +52,7 @@ fn detail<'a>(report: &'a CheckReport, name: &str) -> &'a str {
 /// Checks a board with these quirks. `name` alone fails: its `found`, `expected` and `next` texts
 /// contain the given ones. The lines behind it are skipped if `stops`.
 fn fails(quirks: Quirks, name: &str, stops: bool, [found, expected, next]: [&str; 3]) {
-    let (report, board) = checked(BoardConfig { quirks, ..BoardConfig::default() });
+    let (report, board) = checked(BoardConfig { quirks, ..fenced() });
     assert!(!report.passed());
     let place = NAMES.iter().position(|line| *line == name).expect("a line of that name");
     for (index, line) in report.lines.iter().enumerate() {
@@ -72,10 +79,10 @@ fn fails(quirks: Quirks, name: &str, stops: bool, [found, expected, next]: [&str
 
 #[test]
 fn a_board_as_it_should_be_passes_every_line() {
-    let (report, board) = checked(BoardConfig::default());
+    let (report, board) = checked(fenced());
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
-    assert_eq!(detail(&report, "interface version"), "1.2");
+    assert_eq!(detail(&report, "interface version"), "1.3");
     assert!(
         detail(&report, "capabilities")
             .starts_with("profile float, 4 + 4 streams of 128 bits, 275000 kHz")
@@ -92,7 +99,73 @@ fn a_board_as_it_should_be_passes_every_line() {
     // - 4099 bodies: one each.
     let descriptors = (2 + 2 + 4) + 12 + (2 * 4 * 5 + 4 * 9) + 12;
     assert!(detail(&report, "echo").contains(&format!("{descriptors} descriptors")));
+    let fence = "0x50000000+64M holds 12 masters";
+    assert!(detail(&report, "fence").starts_with(fence), "{}", detail(&report, "fence"));
     assert!(board.counts().cycles < 275_000 * 100, "less than 0.1 s on the board's clock");
+}
+
+/// Why a line was skipped.
+fn skipped<'a>(report: &'a CheckReport, name: &str) -> &'a str {
+    let line = report.lines.iter().find(|line| line.name == name).expect("a line of that name");
+    match &line.outcome {
+        Outcome::Skipped { reason } => reason,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+#[test]
+fn the_fence_of_every_profile_is_proven_master_by_master() {
+    for profile in PROFILES {
+        for address_width in [32, 40] {
+            let (report, _) = checked(BoardConfig { profile, address_width, ..fenced() });
+            assert!(report.passed(), "{report:#?}");
+            let masters = 3 * profile.mm2s_widths.len();
+            let expected = format!(
+                "0x50000000+64M holds {masters} masters: each met a decode error in the 65536 bytes at \
+                 0x54000000"
+            );
+            assert_eq!(detail(&report, "fence"), expected, "{}", profile.name);
+        }
+    }
+}
+
+/// A step with the memory of an open master in the guard works: nothing outside the granted memory
+/// and the guard is touched (`checked` finds no violation), and the other masters are held.
+#[test]
+fn each_master_that_the_fence_does_not_hold_is_named_and_reaches_the_guard_alone() {
+    const ALL: [(usize, Master); 12] = {
+        let mut all = [(0, Master::Sg); 12];
+        let mut k = 0;
+        while k < 12 {
+            all[k] = (k / 3, Master::ALL[k % 3]);
+            k += 1;
+        }
+        all
+    };
+    const TEXTS: [&str; 3] = ["SG", "MM2S", "S2MM"];
+    for (k, (core, _)) in ALL.iter().enumerate() {
+        let quirks = Quirks { unfenced: &ALL[k..=k], ..Quirks::default() };
+        let found = format!("dma{core} {} in reach of 0x54000000", TEXTS[k % 3]);
+        fails(quirks, "fence", false, [&found, "12 masters", "block design"]);
+    }
+    let names: Vec<_> = (0..12).map(|k| format!("dma{} {}", k / 3, TEXTS[k % 3])).collect();
+    let quirks = Quirks { unfenced: &ALL, ..Quirks::default() };
+    fails(quirks, "fence", false, [&names.join(", "), "12 masters", "block design"]);
+}
+
+#[test]
+fn without_a_fence_or_a_guard_nothing_is_proven_and_nothing_fails() {
+    let no_guard = Quirks { no_guard: true, ..Quirks::default() };
+    let at_the_end = Fence::new(0x7C00_0000, 64 << 20);
+    for (config, why) in [
+        (BoardConfig::default(), "not proven: the bitstream reports no fence"),
+        (BoardConfig { quirks: no_guard, ..fenced() }, "not proven: no memory is reserved behind"),
+        (BoardConfig { fence: at_the_end, ..fenced() }, "not proven: no memory is reserved behind"),
+    ] {
+        let (report, _) = checked(config);
+        assert!(report.passed(), "{report:#?}");
+        assert!(skipped(&report, "fence").starts_with(why), "{}", skipped(&report, "fence"));
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The contract's literal values: offsets, bits, layouts and reset values, typed here a second time
 //! from PG021 and the accelerator's specification.
 
+use zynq_pgs::interface::fence::{FENCE_UNIT, Fence};
 use zynq_pgs::interface::{
     address_map, axi_dma, control, descriptor, profile, record, stripe, usr_access,
 };
@@ -19,6 +20,19 @@ fn regions_stand_where_the_block_design_puts_them() {
     assert_eq!(address_map::UIO_CONTROL_MAP, "control");
     assert_eq!(address_map::DDR_LOW, 0..0x8000_0000);
     assert_eq!(address_map::DDR_HIGH, 0x8_0000_0000..0x8_8000_0000);
+    assert_eq!((address_map::MEMORY_BASE, address_map::MEMORY_BYTES), (0x5000_0000, 0x400_0000));
+    assert_eq!(address_map::UIO_MEMORY_NODE, "pgs-memory");
+    assert_eq!((address_map::UIO_GUARD_NODE, address_map::GUARD_BYTES), ("pgs-guard", 0x1_0000));
+}
+
+/// FENCE_BASE and FENCE_SIZE count 64 KiB, and a size of 0 is no fence.
+#[test]
+fn the_fence_is_reported_in_units_of_64_kib() {
+    assert_eq!(FENCE_UNIT, 0x1_0000);
+    assert_eq!(Fence::to_registers(Some(Fence::default())), [0x5000, 0x400]);
+    assert_eq!(Fence::to_registers(None), [0, 0]);
+    let high = Fence::new(0x8_4000_0000, 0x4000_0000);
+    assert_eq!(Fence::from_registers([0x8_4000, 0x4000]), Ok(high));
 }
 
 #[test]
@@ -147,6 +161,8 @@ fn control_registers_stand_at_their_published_offsets() {
             ("NUMBERS", 0x144),
             ("WINDOW", 0x148),
             ("WINDOW_CAPACITY", 0x14C),
+            ("FENCE_BASE", 0x150),
+            ("FENCE_SIZE", 0x154),
             ("ERROR", 0x180),
             ("ERROR_DETAIL", 0x184),
             ("CYCLES_LO", 0x188),
@@ -162,8 +178,8 @@ fn control_registers_stand_at_their_published_offsets() {
         ]
     );
     assert_eq!(control::IDENTIFICATION_VALUE.to_be_bytes(), *b"PGS1");
-    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 2));
-    assert_eq!(control::VERSION.reset, 0x0001_0002);
+    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 3));
+    assert_eq!(control::VERSION.reset, 0x0001_0003);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
     assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
     assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);

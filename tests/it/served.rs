@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use crate::common::{bits, row};
 use bitstream_model::external::{ExternalAccelerator, ModelAccelerator};
 use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
+use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::remote::{
     Ended, MemoryFile, MemoryFileError, ServeError, Server, Stopper, Visit,
@@ -98,6 +99,29 @@ fn bind(config: BoardConfig, socket: &Path) -> Result<Server, ServeError> {
 fn at(socket: &Path) -> OpenOptions {
     let board = BoardChoice::Served { socket: socket.to_owned() };
     OpenOptions { board, ..OpenOptions::default() }
+}
+
+/// The driver's memory is the file's 64 MiB at 0x5000_0000.
+#[test]
+fn memory_outside_the_fence_is_refused_by_name_before_a_step() {
+    let fence = |text: &str| Some(text.parse::<Fence>().expect("a fence"));
+    let served =
+        Served::new(BoardConfig { fence: fence("0x50000000+32M"), ..BoardConfig::default() });
+    let error = Accelerator::open(served.options()).expect_err("half of the memory is outside");
+    let Error::Open(OpenError::Platform(PlatformError::OutsideFence { region, .. })) = &error
+    else {
+        panic!("{error:?}");
+    };
+    assert!(region.ends_with("board.memory"), "{region}");
+    let chain = format!("{error}: {}", std::error::Error::source(&error).expect("a cause"));
+    for part in ["67108864 bytes at 0x50000000", "the fence 0x50000000+32M", "device tree"] {
+        assert!(chain.contains(part), "{chain}");
+    }
+    let served =
+        Served::new(BoardConfig { fence: fence("0x40000000+512M"), ..BoardConfig::default() });
+    let mut accelerator = served.open();
+    assert_eq!(accelerator.capabilities().fence, fence("0x40000000+512M"));
+    steps(&mut accelerator, 5);
 }
 
 fn steps(accelerator: &mut Accelerator, cubes: u16) -> (Vec<u32>, Vec<StepReport>) {

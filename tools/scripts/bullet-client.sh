@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Builds the library for C and tools/clients/bullet with it, and runs Bullet's scenes on both solvers.
 #
-# usage: bullet-client.sh                   all scenes but `spread`, and compares their table with the README's
-#        bullet-client.sh --renew-table     writes their table to the README
-#        bullet-client.sh ARGUMENT...       arguments of bullet-client, such as --board emulated:naive,world pile
+# usage: bullet-client.sh                all scenes but `spread`; compares their table with the README's
+#        bullet-client.sh --renew-table  all scenes but `spread`; writes their table to the README
+#        bullet-client.sh ARGUMENT...    arguments of bullet-client, such as --board emulated pile
 #
-# Exit code: 0 done, 1 a limit does not hold, the table differs or something does not build, 2 wrong usage,
-# 77 skipped: not on this machine.
+# Exit code: 0 done, 1 a limit does not hold, the table differs or something does not build, 2 wrong
+# usage, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
@@ -29,7 +29,9 @@ cp -p "$target_root/release/libzynq_pgs_c.a" tools/capi/include/zynq_pgs.h "$wor
 attend make --silent -C tools/clients/bullet ZYNQ_PGS_DIR="$work/library" BUILD="$work" ||
 	fail "tools/clients/bullet does not build"
 
-client=$work/bullet-client readme=tools/clients/bullet/README.md table=$work/table
+client=$work/bullet-client
+readme=tools/clients/bullet/README.md
+table=$work/table
 [ $# = 0 ] || [ "$*" = --renew-table ] || {
 	code=0
 	attend "$client" "$@" || code=$?
@@ -46,13 +48,15 @@ echo "bullet-client: the scenes took $SECONDS s"
 
 if [ $# = 1 ]; then
 	awk -v table="$table" '/^```$/ { inside = 0 } !inside
-		/^```text$/ { inside = 1; while ((getline line < table) > 0) print line }' "$readme" > "$work/README.md"
+		/^```text$/ { inside = 1; while ((getline line < table) > 0) print line }' \
+		"$readme" > "$work/README.md"
 	cp "$work/README.md" "$readme"
 	exit 0
 fi
 
 # Another Bullet, or another sine and cosine, rounds otherwise, and many scenes are chaotic.
 printed() { awk '/^```$/ { inside = 0 } inside; /^```text$/ { inside = 1 }' "$readme"; }
+[ -n "$(printed)" ] || fail "$readme has no table: tools/scripts/bullet-client.sh --renew-table"
 not_compared() { echo "not compared with $readme: $*"; exit 0; }
 [ "$(uname -m)" = x86_64 ] || not_compared "it was made on x86-64"
 grep -qw fma /proc/cpuinfo || not_compared "it was made by a processor with FMA"
@@ -62,4 +66,4 @@ version() { grep -o -m 1 '^Bullet [0-9.]*'; }
 # Processor times differ from run to run.
 same() { sed 's/\(processor time\).*/\1/'; }
 diff -u --label "$readme" --label bullet-client <(printed | same) <(same < "$table") ||
-	fail "the table of $readme is not what the client prints; run tools/scripts/bullet-client.sh --renew-table"
+	fail "the client prints another table than $readme: tools/scripts/bullet-client.sh --renew-table"

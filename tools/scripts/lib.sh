@@ -29,7 +29,7 @@ nameless() {
 	local file path found
 	for file in "$@"; do
 		for path in "$repository/" "${CARGO_HOME:-$HOME/.cargo}/" "$HOME/."; do
-			found=$(grep -a -o -F -e "$path" "$file" | wc -l)
+			found=$({ grep -a -o -F -e "$path" "$file" || true; } | wc -l)
 			[ "$found" = 0 ] || fail "$file has $found paths of the builder: $path"
 		done
 	done

@@ -49,7 +49,18 @@ plant() {
 }
 
 # As it is, with another clock, and without its ending: from the script to the files for the board.
-mock tools/vivado/zcu102.tcl || fail "the script is refused"
+# One segment for each of the 12 masters, at the memory that the device tree reserves, wherever that is.
+fences() {
+	local found
+	found=$(grep -c -E "^address +dma[0-3]/Data_(SG|MM2S|S2MM) +processor/SAXIGP[2-5]/HP[0-3]_$1 +$2\$" <<<"$3")
+	[ "$found" = 12 ] || fail "$found masters with the segment $1 at $2: $3"
+}
+said=$(mock tools/vivado/zcu102.tcl) || fail "the script is refused: $said"
+echo "$said"
+fences DDR_LOW '0x0050000000 \+ 0x4000000' "$said"
+attend "$target_root/debug/rtlgen" generate --out "$folder/high" --memory 0x840000000+1G
+said=$(mock tools/vivado/zcu102.tcl -rtl "$folder/high" -until design) || fail "another memory: $said"
+fences DDR_HIGH '0x0840000000 \+ 0x40000000' "$said"
 for file in zynq-pgs.bit zynq-pgs.bif zynq-pgs.xsa timing.rpt utilization.rpt; do
 	[ -e "$folder/out/$file" ] || fail "no $file"
 done
@@ -83,8 +94,19 @@ script=zcu102.tcl
 		"dma0/S_AXI_LITE/Reg at offset 0xA0010000, the interface at 0xA0000000"
 	plant "a wrong length of the registers" $script 's/$pgs(control_address) $pgs(control_bytes)/$pgs(control_address) $pgs(dma_bytes)/' \
 		"accelerator/s_axi/reg0 at range 0x10000, the interface at 0x1000"
-	plant "half of the memory" $script '/_DDR_HIGH {/d' "has no address for processor/SAXIGP2/HP0_DDR_HIGH"
-	plant "the flash within reach" $script 's/{LPS_OCM QSPI}/LPS_OCM/' "HP0_QSPI, which is not excluded"
+	plant "a master without memory" $script 's|list dma$k/Data_SG |list |' "dma0/Data_SG reaches processor/SAXIGP2/HP0_DDR_HIGH"
+	plant "a second segment" $script 's|^\tplace $space ${port}_$pgs(memory_segment).*|&; place $space ${port}_DDR_HIGH 0x800000000 0x80000000|' \
+		"dma0/Data_MM2S has a second segment, processor/SAXIGP2/HP0_DDR_HIGH"
+	plant "all of the low memory" $script 's/{\*}$pgs(memory)/0 0x80000000/' \
+		"HP0_DDR_LOW at offset 0x0, the interface at 0x50000000"
+	plant "twice the memory" $script 's/{\*}$pgs(memory)/[lindex $pgs(memory) 0] 0x8000000/' \
+		"HP0_DDR_LOW at range 0x8000000, the interface at 0x4000000"
+	plant "the flash within reach" $script 's/ QSPI / /' "HP0_QSPI, which is not excluded"
+	plant "PCIe left in" $script 's/ PCIE_LOW / /' "HP0_PCIE_LOW, which is not excluded"
+	plant "the high memory left in" $script 's/{DDR_LOW DDR_HIGH /{DDR_LOW /' "HP0_DDR_HIGH, which is not excluded"
+	plant "secure accesses" $script '/wire non_secure/d' "processor/saxigp2_arprot is driven by the bus"
+	plant "secure writes" $script 's| processor/saxigp${gp}_awprot||' "processor/saxigp2_awprot is driven by the bus"
+	plant "a constant that says secure" $script 's/CONST_VAL 2/CONST_VAL 5/' "is 5, which says secure"
 	plant "a hanging pin" $script '/wire clock\/locked/d' "reset/dcm_locked hangs"
 	plant "two drivers" $script 's|^\twire clock/locked|\twire processor/pl_clk0 reset/slowest_sync_clk\n&|' \
 		"reset/slowest_sync_clk has two drivers"
@@ -103,6 +125,8 @@ script=zcu102.tcl
 	plant "a second clock" $script 's|clocked memory$k aclk|wire processor/pl_clk0 memory$k/aclk; clocked memory$k {}|' \
 		"dma0/M_AXI_MM2S runs on clock/clk_out1, memory0/S01_AXI on processor/pl_clk0"
 	plant "a wrong rate" $script 's/$khz \/ 1000.0/$khz \/ 1001.0/' "not 275000"
+	plant "another PL clock" $script 's/__FREQMHZ $pgs(pl_clock_mhz)/__FREQMHZ 275/' \
+		"pl_clk0 is 275 MHz, and USR_ACCESS asks for 100"
 	plant "no word for the loader" $script '/-fileset constrs_1/d' "USR_ACCESS of the bitstream is ''"
 	plant "the word of another rate" $script 's/USR_ACCESS $pgs(usr_access)/USR_ACCESS $pgs(pl_clock_mhz)/' \
 		"USR_ACCESS of the bitstream is '100', not 0x50470064"

@@ -10,7 +10,9 @@
 #   - a clock pin without a clock, a bus between two clocks, a reset of another clock
 #   - a channel of a DMA core at the wrong stream of the accelerator
 #   - an interrupt that does not reach pl_ps_irq0
-#   - a segment that is missing, superfluous, or not where the interface has it
+#   - a segment that is missing, superfluous, or not where the interface has it; for a master of a DMA core any
+#     but the one of the fence
+#   - a memory port that is not held non-secure (AxPROT[1])
 #   - a DMA core, a port or a clock that is not built as the interface says
 #   - a header or a module of the Verilog that is not in the project
 #
@@ -42,6 +44,7 @@ set parameters(clk_wiz) {
 	USE_LOCKED true USE_RESET true RESET_TYPE ACTIVE_HIGH
 }
 set parameters(proc_sys_reset) {}
+set parameters(xlconstant) {CONST_WIDTH 1 CONST_VAL 1}
 set parameters(smartconnect) {NUM_SI 2 NUM_MI 1}
 set parameters(axi_dma) {
 	c_include_sg 1 c_sg_include_stscntrl_strm 1 c_micro_dma 0 c_sg_length_width 14 c_addr_width 32
@@ -68,6 +71,9 @@ proc shape:zynq_ultra_ps_e {cell} {
 	foreach {number port} {2 hp0_fpd 3 hp1_fpd 4 hp2_fpd 5 hp3_fpd} {
 		if {[value $cell PSU__USE__S_AXI_GP$number]} {
 			dict set pins saxi${port}_aclk {in clock 1}
+			# Signals of the bus. A net of their own takes the place of the bus's.
+			dict set pins saxigp${number}_arprot {in overrides 3}
+			dict set pins saxigp${number}_awprot {in overrides 3}
 			dict set buses S_AXI_[string toupper $port] \
 				[list slave memory [value $cell PSU__SAXIGP${number}__DATA_WIDTH] saxi${port}_aclk]
 		}
@@ -83,6 +89,7 @@ proc shape:clk_wiz {cell} {
 	}
 	return [list $pins {}]
 }
+proc shape:xlconstant {cell} { return [list [list dout [list out data [value $cell CONST_WIDTH]]] {}] }
 proc shape:proc_sys_reset {cell} {
 	return {{
 		slowest_sync_clk {in clock 1} ext_reset_in {in reset 1} dcm_locked {in data 1}
@@ -250,7 +257,7 @@ proc segments {} {
 			axi_dma { dict set segments $name/Reg $name }
 			zynq_ultra_ps_e {
 				regexp {HP(\d)} $bus - k
-				foreach part {DDR_LOW DDR_HIGH LPS_OCM QSPI} {
+				foreach part {DDR_LOW DDR_HIGH LPS_OCM QSPI PCIE_LOW} {
 					dict set segments $cell/SAXIGP[expr {$k + 2}]/HP${k}_$part $name
 				}
 			}
@@ -363,6 +370,8 @@ proc get_property {name object} {
 		PROGRESS { return 100% }
 		STATS.WNS - STATS.WHS { return [expr {[info exists ::env(MOCK_SLACK)] ? $::env(MOCK_SLACK) : 0.1}] }
 		DIRECTORY { return $bit_folder }
+		OFFSET { return [lindex $::assigned([lindex $object 0]) 0] }
+		RANGE { return [lindex $::assigned([lindex $object 0]) 1] }
 		default { refuse "no property $name" }
 	}
 }
@@ -382,7 +391,13 @@ proc get_bd_addr_spaces name {
 	if {![dict exists [spaces] $name]} { refuse "no address space $name" }
 	return $name
 }
-proc get_bd_addr_segs pattern { return [dict keys [segments] $pattern] }
+# The segments of this name; with -of_objects, the ones that are assigned in an address space.
+proc get_bd_addr_segs args {
+	lassign [arguments get_bd_addr_segs $args {-of_objects} {}] options pattern
+	if {![dict exists $options -of_objects]} { return [dict keys [segments] $pattern] }
+	set space [dict get $options -of_objects]
+	return [lsort [lsearch -all -inline -index 0 -exact [array names ::assigned] $space]]
+}
 
 proc connect_bd_net args {
 	global driver
@@ -469,6 +484,7 @@ proc check {} {
 	check_channels
 	check_interrupt
 	check_addresses
+	check_protection
 	check_parameters
 	summary
 }
@@ -497,7 +513,7 @@ proc check_connections {} {
 	foreach {to from} [array get driver] { dict lappend driving $from $to }
 	foreach name [all pins] {
 		lassign [pin $name] direction role
-		if {$direction eq "in" && ![info exists driver($name)]} { refuse "$name hangs: nothing drives it" }
+		if {$direction eq "in" && $role ne "overrides" && ![info exists driver($name)]} { refuse "$name hangs: nothing drives it" }
 		set must [expr {$role eq "interrupt" || [info exists modules([lindex [split $name /] 0])]}]
 		if {$direction eq "out" && $must && ![dict exists $driving $name]} { refuse "$name hangs: nothing takes it" }
 	}
@@ -589,6 +605,21 @@ proc check_interrupt {} {
 	if {$sources ne [lsort $expected]} { refuse "interrupts $sources, not [lsort $expected]" }
 }
 
+# Every access of a DMA core is non-secure: AxPROT[1] of the memory ports is a constant 1.
+proc check_protection {} {
+	global cells
+	foreach processor [cells_of zynq_ultra_ps_e] {
+		foreach name [all pins] {
+			if {![string match $processor/saxigp*_a?prot $name]} continue
+			set from [lindex [split [source_of $name] /] 0]
+			if {![info exists cells($from)] || $cells($from) ne "xlconstant"} {
+				refuse "$name is driven by the bus, which says secure: an SMMU lets it pass untranslated"
+			}
+			if {!([value $from CONST_VAL] & 2)} { refuse "$name is [value $from CONST_VAL], which says secure" }
+		}
+	}
+}
+
 # Every segment that a master reaches lies where the interface has it, and no other.
 proc check_addresses {} {
 	global pgs assigned
@@ -598,8 +629,7 @@ proc check_addresses {} {
 	}
 	dict set home [accelerator]/s_axi/reg0 [list $pgs(control_address) $pgs(control_bytes)]
 	foreach segment [dict keys [segments]] {
-		if {[string match *_DDR_LOW $segment]} { dict set home $segment $pgs(ddr_low) }
-		if {[string match *_DDR_HIGH $segment]} { dict set home $segment $pgs(ddr_high) }
+		if {[string match *_$pgs(memory_segment) $segment]} { dict set home $segment $pgs(memory) }
 	}
 	set expected {}
 	foreach {space master} [spaces] {
@@ -630,7 +660,12 @@ proc check_addresses {} {
 		}
 	}
 	foreach key [lsort [array names assigned]] {
-		if {![dict exists $expected $key]} { refuse "[lindex $key 0] has an address for [lindex $key 1] without a way there" }
+		if {[dict exists $expected $key]} continue
+		lassign $key space segment
+		if {[dict get [segments] $segment] in [reached [dict get [spaces] $space]]} {
+			refuse "$space has a second segment, $segment"
+		}
+		refuse "$space has an address for $segment without a way there"
 	}
 	# Registers lie in the window of their master, as UG1085 has it.
 	foreach {segment place} $home {
@@ -661,6 +696,8 @@ proc check_parameters {} {
 		set bits [value $processor PSU__${port}__DATA_WIDTH]
 		if {$bits != 128} { refuse "$port has $bits bits; the overlays set the ports to 128" }
 	}
+	set mhz [value $processor PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ]
+	if {$mhz != $::pgs(pl_clock_mhz)} { refuse "pl_clk0 is $mhz MHz, and USR_ACCESS asks for $::pgs(pl_clock_mhz)" }
 	foreach wizard [cells_of clk_wiz] {
 		set wanted [expr {round([value $wizard CLKOUT1_REQUESTED_OUT_FREQ] * 1000)}]
 		if {$wanted != $::expected_khz} { refuse "$wizard makes $wanted kHz, not $::expected_khz" }

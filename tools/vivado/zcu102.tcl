@@ -8,7 +8,7 @@
 #
 #                    one SmartConnect
 #   HPM0_FPD ---------> registers -----> S_AXI_LITE of dma0..dma3, s_axi of the accelerator
-#   HP0..HP3 <--------- memory0..3 <---- SG, MM2S and S2MM of dma0..dma3
+#   HP0..HP3 <--------- memory0..3 <---- SG, MM2S and S2MM of dma0..dma3: one segment a master, the fence
 #                                        dma0..dma3 <===> s0_axis..s3_axis, m0_axis..m3_axis
 #   pl_ps_irq0[0] <---- interrupts <---- both channels of dma0..dma3, the accelerator
 #   pl_clk0 (100 MHz) -> clock (MMCM) -> everything
@@ -173,6 +173,19 @@ proc zcu102::add_registers {} {
 	place processor/Data accelerator/s_axi/* $pgs(control_address) $pgs(control_bytes)
 }
 
+# One address segment for a master, the memory that the device tree reserves; everything else at its port is
+# excluded by name. A segment that this version of the processing system does not have needs no exclusion.
+proc zcu102::fence {space port} {
+	global pgs
+	place $space ${port}_$pgs(memory_segment) {*}$pgs(memory)
+	foreach other {DDR_LOW DDR_HIGH LPS_OCM QSPI PCIE_LOW PCIE_HIGH1 PCIE_HIGH2} {
+		if {$other eq $pgs(memory_segment)} continue
+		foreach found [get_bd_addr_segs ${port}_$other] {
+			exclude_bd_addr_seg -target_address_space [get_bd_addr_spaces $space] $found
+		}
+	}
+}
+
 # AXI DMA k with stream k of the accelerator in both directions, and its three masters at port HP k.
 proc zcu102::add_dma {k} {
 	global pgs
@@ -197,19 +210,10 @@ proc zcu102::add_dma {k} {
 	link dma$k/M_AXI_MM2S memory$k/S01_AXI
 	link dma$k/M_AXI_S2MM memory$k/S02_AXI
 	link memory$k/M00_AXI processor/S_AXI_HP${k}_FPD
-	# A core reaches both parts of the DDR, and neither the on-chip memory nor the flash. A segment that this
-	# version of the processing system does not have needs no exclusion.
-	set port processor/SAXIGP[expr {$k + 2}]/HP$k
-	foreach space [list dma$k/Data_SG dma$k/Data_MM2S dma$k/Data_S2MM] {
-		place $space ${port}_DDR_LOW {*}$pgs(ddr_low)
-		place $space ${port}_DDR_HIGH {*}$pgs(ddr_high)
-		foreach other {LPS_OCM QSPI} {
-			catch {
-				exclude_bd_addr_seg -target_address_space [get_bd_addr_spaces $space] \
-					[segment ${port}_$other]
-			}
-		}
-	}
+	set gp [expr {$k + 2}]
+	foreach space [list dma$k/Data_SG dma$k/Data_MM2S dma$k/Data_S2MM] { fence $space processor/SAXIGP$gp/HP$k }
+	# Non-secure: the AXI DMA drives AxPROT with 000, secure, which an SMMU lets pass untranslated.
+	wire non_secure/dout processor/saxigp${gp}_arprot processor/saxigp${gp}_awprot
 }
 
 proc zcu102::build_design {khz} {
@@ -218,10 +222,31 @@ proc zcu102::build_design {khz} {
 	add_processor
 	add_clock $khz
 	add_accelerator
+	# AxPROT[1]
+	add_ip xlconstant non_secure {CONST_WIDTH 3 CONST_VAL 2}
 	for {set k 0} {$k < [llength $pgs(dma_addresses)]} {incr k} { add_dma $k }
 	add_registers
 	validate_bd_design
+	check_fences
 	save_bd_design
+}
+
+# What Vivado has made of it: every master of a DMA core has the one segment, where the bitstream reports it.
+proc zcu102::check_fences {} {
+	global pgs
+	lassign $pgs(memory) base bytes
+	for {set k 0} {$k < [llength $pgs(dma_addresses)]} {incr k} {
+		foreach master {SG MM2S S2MM} {
+			set space dma$k/Data_$master
+			set found [get_bd_addr_segs -of_objects [get_bd_addr_spaces $space]]
+			if {[llength $found] != 1} { error "$space has [llength $found] segments, not one: $found" }
+			set offset [get_property OFFSET $found]
+			set range [get_property RANGE $found]
+			if {$offset != $base || $range != $bytes} {
+				error "$space has $found at $offset + $range, not at $base + $bytes"
+			}
+		}
+	}
 }
 
 # ---------------------------------------------------------------------------------------------------------

@@ -38,6 +38,8 @@ pub const UIO_MEMORY_NODE: &str = "pgs-memory";
 pub const UIO_DMA_MAPS: [&str; DMA_COUNT_MAX] = ["dma0", "dma1", "dma2", "dma3"];
 /// Name of the UIO map of the control block.
 pub const UIO_CONTROL_MAP: &str = "control";
+/// Name of the UIO node of the guard: memory behind the fence, for a test of the fence alone.
+pub const UIO_GUARD_NODE: &str = "pgs-guard";
 /// Name of the UIO map of the reserved memory.
 pub const UIO_MEMORY_MAP: &str = "memory";
 /// Name of the u-dma-buf, where DMA memory comes from that kernel module.
@@ -49,6 +51,8 @@ pub const MEMORY_BASE: u64 = 0x5000_0000;
 /// Default length of the reserved memory, bytes: 38,880 bodies with 127,000 collisions take 19 MB
 /// and some slack.
 pub const MEMORY_BYTES: u64 = 64 << 20;
+/// Length of the guard, which begins where the fence ends: a page of every kernel.
+pub const GUARD_BYTES: u64 = 0x1_0000;
 
 /// Addresses of low DDR: 2 GiB on the ZCU102.
 pub const DDR_LOW: core::ops::Range<u64> = 0..0x8000_0000;

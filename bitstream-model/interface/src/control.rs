@@ -326,7 +326,7 @@ pub const IDENTIFICATION_VALUE: u32 = 0x5047_5331;
 /// Major interface version of this module.
 pub const VERSION_MAJOR: u32 = 1;
 /// Minor interface version of this module.
-pub const VERSION_MINOR: u32 = 2;
+pub const VERSION_MINOR: u32 = 3;
 
 /// Always [`IDENTIFICATION_VALUE`].
 pub const IDENTIFICATION: Register =
@@ -412,6 +412,11 @@ pub const WINDOW: Register =
 /// Places and delay lines of a design that streams the collisions once.
 pub const WINDOW_CAPACITY: Register =
     read_only("WINDOW_CAPACITY", 0x14C, &[window_capacity::SLOTS, window_capacity::LAG]);
+
+/// First byte of the [`Fence`](super::fence::Fence), in units of [`FENCE_UNIT`](super::fence::FENCE_UNIT).
+pub const FENCE_BASE: Register = read_only("FENCE_BASE", 0x150, &[]);
+/// Length of the fence, in the same units; 0: there is none.
+pub const FENCE_SIZE: Register = read_only("FENCE_SIZE", 0x154, &[]);
 
 /// Sticky error; cleared by a reset only.
 pub const ERROR: Register = read_only("ERROR", 0x180, &[error::CODE, error::CHANNEL]);
@@ -508,6 +513,8 @@ pub const REGISTERS: &[Register] = &[
     NUMBERS,
     WINDOW,
     WINDOW_CAPACITY,
+    FENCE_BASE,
+    FENCE_SIZE,
     ERROR,
     ERROR_DETAIL,
     CYCLES_LO,

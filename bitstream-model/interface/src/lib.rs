@@ -9,6 +9,7 @@ pub mod axi_dma;
 pub mod control;
 pub mod descriptor;
 pub mod extension;
+pub mod fence;
 pub mod message;
 pub mod number;
 pub mod profile;

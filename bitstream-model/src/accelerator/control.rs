@@ -5,16 +5,17 @@ use crate::config::{BoardConfig, Hazards, Subnormals};
 use pgs_interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
     COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, COUNTER_MAX, CYCLES_HI, CYCLES_LO, DMA, ERROR,
-    ERROR_DETAIL, ErrorCode, FEATURES, FLAGS, FRICTION, FRICTION_DEPTH, FRICTION_ITERATIONS, GIE,
-    GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER, IMPULSE_SUM_HI, IMPULSE_SUM_LO,
-    IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS,
-    POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS, SHAPE_CAPACITY,
-    SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
-    SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW, WINDOW_CAPACITY,
-    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
-    memory_per_record, numbers,
+    ERROR_DETAIL, ErrorCode, FEATURES, FENCE_BASE, FENCE_SIZE, FLAGS, FRICTION, FRICTION_DEPTH,
+    FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
+    MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS,
+    SHAPE_CAPACITY, SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
+    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW,
+    WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq,
+    issue, memory_per_record, numbers,
 };
 use pgs_interface::extension::Extensions;
+use pgs_interface::fence::Fence;
 use pgs_interface::number::Numbers;
 use pgs_interface::profile::{Depth, Inertia, Window};
 
@@ -368,6 +369,8 @@ impl Registers {
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
             _ if offset == WINDOW.offset => window::units(&profile.flow),
             _ if offset == WINDOW_CAPACITY.offset => window::capacity(&profile.flow),
+            _ if offset == FENCE_BASE.offset => Fence::to_registers(config.fence)[0],
+            _ if offset == FENCE_SIZE.offset => Fence::to_registers(config.fence)[1],
             _ if offset == ERROR.offset => self.error,
             _ if offset == ERROR_DETAIL.offset => self.error_detail,
             _ if offset == CYCLES_LO.offset => low(counters.cycles),

@@ -13,7 +13,7 @@ mod mover;
 mod undisturbed;
 
 use crate::config::beat_cycles;
-use crate::config::quirks::Resettable;
+use crate::config::quirks::{Master, Resettable};
 use crate::config::{BoardConfig, Delays, cycles_of};
 use crate::fault::{FaultKind, Faults, Place, StepPhase, end_of_reset};
 use crate::memory::Memory;
@@ -21,6 +21,7 @@ use crate::recording::Recorder;
 use crate::stream::Stream;
 use crate::violation::Log;
 use pgs_interface::axi_dma::{DMACR, Direction, S2MM_OFFSET, dmacr};
+use pgs_interface::fence::Fence;
 
 use channel::{Channel, Work};
 
@@ -31,6 +32,9 @@ struct Build {
     length_width: u32,
     address_width: u32,
     scatter_gather: bool,
+    /// The fence, and the masters that it does not hold.
+    fence: Option<Fence>,
+    unfenced: &'static [(usize, Master)],
     /// Binary logarithm of the clocks that a beat takes on the streams.
     mm2s_beat_shift: u32,
     s2mm_beat_shift: u32,
@@ -42,6 +46,13 @@ impl Build {
     /// Clock cycles in `ns` nanoseconds.
     fn cycles(&self, ns: u64) -> u64 {
         cycles_of(ns, self.clock_khz)
+    }
+
+    /// Whether the interconnect has a way from a master to these bytes.
+    fn reaches(&self, master: Master, address: u64, bytes: usize) -> bool {
+        self.fence.is_none_or(|fence| {
+            fence.contains(address, bytes as u64) || self.unfenced.contains(&(self.core, master))
+        })
     }
 }
 
@@ -112,6 +123,8 @@ impl Core {
             length_width: config.quirks.length_register.unwrap_or(config.length_width),
             address_width: config.address_width,
             scatter_gather: config.scatter_gather,
+            fence: config.fence,
+            unfenced: config.quirks.unfenced,
             mm2s_beat_shift: shift(profile.mm2s_widths),
             s2mm_beat_shift: shift(profile.s2mm_widths),
             delays: config.delays,

@@ -8,6 +8,7 @@ use super::channel::{Channel, Descriptor, Work};
 use super::faults::Next;
 use super::{Build, PacketCount, Surroundings};
 use crate::cast::register;
+use crate::config::quirks::Master;
 use crate::fault::FaultKind;
 use crate::memory::Denied;
 use crate::recording::{MovedBeats, Recorder};
@@ -270,7 +271,9 @@ impl Channel {
         // Without a realignment engine the low address bits do not exist: the data is wrong, and
         // the violation was recorded when the descriptor was fetched.
         let at = at & !(u64::from(BEAT) - 1);
+        let fenced_off = !build.reaches(Master::Data(self.direction), at, n * BEAT_BYTES);
         let denied = match self.direction {
+            direction if fenced_off => with.memory.check(direction, at, n).err(),
             Direction::Mm2s if with.by_reference && mask == 0 && !self.faulty.cut => {
                 self.refer(at, n, stream, with).err()
             }
@@ -314,6 +317,8 @@ impl Channel {
                 bytes: (n * BEAT_BYTES) as u64,
                 denied,
             });
+        }
+        if denied.is_some() || fenced_off {
             self.data_error(build, dmasr::DMA_DEC_ERR, status::DMA_DEC_ERR, with);
             return None;
         }
@@ -392,6 +397,11 @@ impl Channel {
             self.fail(build, dmasr::SG_DEC_ERR.mask());
             return;
         }
+        // The status lies in the same segment, which whole descriptors fill.
+        if !build.reaches(Master::Sg, address, BYTES) {
+            self.fail(build, dmasr::SG_DEC_ERR.mask());
+            return;
+        }
         let wide = build.address_width > 32;
         let join = |low: usize, high: usize| {
             u64::from(words[low]) | if wide { u64::from(words[high]) << 32 } else { 0 }
@@ -447,7 +457,9 @@ impl Channel {
             return;
         }
         let beats = bd.length.div_ceil(BEAT) as usize;
-        if let Err(denied) = with.memory.check_write(bd.buffer & !(u64::from(BEAT) - 1), beats) {
+        if let Err(denied) =
+            with.memory.check(self.direction, bd.buffer & !(u64::from(BEAT) - 1), beats)
+        {
             with.log.violation(ViolationKind::OutsideGrant {
                 core: build.core,
                 direction: self.direction,

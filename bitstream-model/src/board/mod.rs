@@ -174,20 +174,26 @@ impl Board {
             Some(FaultKind::PowerLost) => self.powerless = true,
             Some(FaultKind::OtherBitstream { identification }) => {
                 self.other_design = Some(identification);
-                self.log.pardon();
-                for (number, core) in self.cores.iter_mut().enumerate() {
-                    if let Some(recorder) = &mut self.recorder {
-                        core.abandons_all(self.now, recorder);
-                    }
-                    *core = Core::new(number, &self.config);
-                }
-                self.accelerator.replace_model(Accelerator::new(&self.config));
-                self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
+                self.load_anew();
             }
+            Some(FaultKind::Reloaded) => self.load_anew(),
             Some(FaultKind::IrqSpurious) => self.interrupt.disturb(1),
             Some(FaultKind::IrqStorm { count }) => self.interrupt.disturb(count),
             _ => {}
         }
+    }
+
+    /// Forgets all state of the logic: every register is as after a reset, the streams are empty.
+    fn load_anew(&mut self) {
+        self.log.pardon();
+        for (number, core) in self.cores.iter_mut().enumerate() {
+            if let Some(recorder) = &mut self.recorder {
+                core.abandons_all(self.now, recorder);
+            }
+            *core = Core::new(number, &self.config);
+        }
+        self.accelerator.load_anew(Accelerator::new(&self.config));
+        self.inputs.iter_mut().chain(&mut self.outputs).for_each(Stream::clear);
     }
 
     /// Whether the accelerator or a DMA engine has work.

@@ -13,6 +13,7 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::extension::Extensions;
+use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
 use pgs_interface::record::BEAT_BYTES;
@@ -132,6 +133,9 @@ pub struct BoardConfig {
     pub length_width: u32,
     /// Width of the DMA's memory addresses, 32 to 64 bits.
     pub address_width: u32,
+    /// The one address segment that the DMA masters reach. A board with memory of its own then
+    /// allocates there alone. Without one they reach all of the DDR.
+    pub fence: Option<Fence>,
     /// Whether the DMAs have the scatter-gather engine.
     pub scatter_gather: bool,
     /// Whether the board goes dead after the first violation, so that a test cannot miss it.
@@ -153,7 +157,8 @@ pub struct BoardConfig {
 
 impl Default for BoardConfig {
     /// The `float` profile, interlocked, sustained bandwidth of the ZCU102, 26-bit lengths, 40-bit
-    /// addresses, every extension, strict, nothing built wrongly.
+    /// addresses, no fence (so that memory lies on both sides of 4 GiB), every extension, strict,
+    /// nothing built wrongly.
     fn default() -> Self {
         Self {
             profile: &FLOAT,
@@ -166,6 +171,7 @@ impl Default for BoardConfig {
             bandwidth: Bandwidth::ZCU102_SUSTAINED,
             length_width: LENGTH_WIDTH_MAX,
             address_width: 40,
+            fence: None,
             scatter_gather: true,
             strict: true,
             delays: Delays::default(),

@@ -42,6 +42,20 @@ pub enum Coherency {
     },
 }
 
+/// A master of a DMA core, with an address map of its own in the block design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Master {
+    /// Descriptors of both channels.
+    Sg,
+    /// Data of a channel.
+    Data(Direction),
+}
+
+impl Master {
+    /// All masters of a core.
+    pub const ALL: [Self; 3] = [Self::Sg, Self::Data(Direction::Mm2s), Self::Data(Direction::S2mm)];
+}
+
 /// A part that has a reset of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resettable {
@@ -69,6 +83,10 @@ pub struct Quirks {
     pub held_reset: Option<Resettable>,
     /// A stream between a DMA core and the accelerator that carries nothing.
     pub unconnected: Option<(usize, Direction)>,
+    /// Masters of DMA cores that the fence does not hold: the block design gives them more.
+    pub unfenced: &'static [(usize, Master)],
+    /// Whether the device tree reserves no guard behind the fence.
+    pub no_guard: bool,
 }
 
 impl Default for Quirks {
@@ -81,6 +99,8 @@ impl Default for Quirks {
             coherency: Coherency::default(),
             held_reset: None,
             unconnected: None,
+            unfenced: &[],
+            no_guard: false,
         }
     }
 }

@@ -24,7 +24,7 @@ use crate::fault::Faults;
 use crate::memory::Memory;
 use crate::stream::Stream;
 use crate::violation::Log;
-use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl};
+use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl, reset};
 
 /// Beats of each stream that are offered at once.
 const OFFERED_BEATS: usize = 64;
@@ -316,11 +316,14 @@ impl Installed {
         Self { model, external: external.map(External::new) }
     }
 
-    /// Another design takes the model's place; an external accelerator stays where it is. The stages so
-    /// far stay in the recording.
-    pub(crate) fn replace_model(&mut self, mut model: Accelerator) {
+    /// A new model takes the model's place, and an external accelerator is reset. The stages so far
+    /// stay in the recording.
+    pub(crate) fn load_anew(&mut self, mut model: Accelerator) {
         model.watch_after(&mut self.model);
         self.model = model;
+        if let Some(external) = &mut self.external {
+            external.write(RESET.offset, reset::RESET.mask());
+        }
     }
 
     pub(crate) fn error(&self) -> Option<&ExternalError> {

@@ -38,7 +38,7 @@ impl ModelAccelerator {
             outputs: streams(config.profile.s2mm_widths),
             log: Log::new(),
             faults: Faults::default(),
-            memory: Memory::new(config.address_width, config.quirks.coherency),
+            memory: Memory::of(config),
             now: 0,
         })
     }

@@ -31,8 +31,11 @@ use pgs_support::Process;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards, Subnormals};
-use pgs_interface::control::{FEATURES, IDENTIFICATION, IDENTIFICATION_VALUE, features};
+use pgs_interface::control::{
+    FEATURES, FENCE_BASE, FENCE_SIZE, IDENTIFICATION, IDENTIFICATION_VALUE, features,
+};
 use pgs_interface::extension::Extensions;
+use pgs_interface::fence::Fence;
 use pgs_interface::profile::{FLOAT, Inertia};
 use pgs_interface::record::Beat;
 
@@ -78,7 +81,8 @@ impl SimulatorProcess {
     }
 
     /// Starts a simulator as the accelerator of a board that is built as `config` says. The board
-    /// treats subnormal numbers as the simulator does, and has no extension that the simulator lacks.
+    /// treats subnormal numbers as the simulator does, has the fence that it reports, and no extension that
+    /// it lacks.
     ///
     /// # Errors
     /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] and
@@ -107,6 +111,8 @@ impl SimulatorProcess {
             false => Subnormals::Keep,
         };
         config.extensions = config.extensions.and(Extensions::reported(features));
+        let fence = [simulator.read(FENCE_BASE.offset)?, simulator.read(FENCE_SIZE.offset)?];
+        config.fence = Fence::from_registers(fence).unwrap_or_default();
         Ok(simulator)
     }
 

@@ -119,6 +119,9 @@ pub enum FaultKind {
         /// The value of its IDENTIFICATION register.
         identification: u32,
     },
+    /// The programmable logic is loaded anew, with the same design: every register is as after a
+    /// reset. Memory stays. Suspend and resume look the same.
+    Reloaded,
     /// The accelerator gives up with a sticky error.
     AcceleratorError {
         /// The error.
@@ -206,6 +209,7 @@ impl FaultKind {
             Self::IrqSpurious
             | Self::IrqStorm { .. }
             | Self::OtherBitstream { .. }
+            | Self::Reloaded
             | Self::PowerLost => Site::Board,
         }
     }

@@ -63,7 +63,7 @@ pub enum FaultError {
 }
 
 /// One of each kind, with the default of its value.
-const KINDS: [FaultKind; 29] = [
+const KINDS: [FaultKind; 30] = [
     FaultKind::DmaIntErr,
     FaultKind::DmaSlvErr,
     FaultKind::DmaDecErr,
@@ -90,6 +90,7 @@ const KINDS: [FaultKind; 29] = [
     FaultKind::ResetSlow { ns: 1_000_000 },
     FaultKind::ResetNever,
     FaultKind::OtherBitstream { identification: 0 },
+    FaultKind::Reloaded,
     FaultKind::AcceleratorHang,
     FaultKind::NoDone,
     FaultKind::PowerLost,
@@ -142,6 +143,7 @@ impl FaultKind {
             Self::ResetSlow { .. } => "reset-slow",
             Self::ResetNever => "reset-never",
             Self::OtherBitstream { .. } => "other-bitstream",
+            Self::Reloaded => "reloaded",
             Self::AcceleratorError { .. } => ACCELERATOR_ERROR,
             Self::AcceleratorHang => "accelerator-hang",
             Self::NoDone => "no-done",

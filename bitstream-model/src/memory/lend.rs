@@ -10,13 +10,13 @@ pub(crate) type Lent<'a, const N: usize> = ([&'a [Beat]; N], [&'a mut [Beat]; N]
 impl Memory {
     /// Borrows beats for the device, each with its place and number: `reads` to read, `writes` to
     /// write. `None` if the device may not do one of these accesses, if two writes overlap, or if
-    /// the memory is external. The addresses are multiples of a beat.
+    /// the memory is external, or the fence matters. The addresses are multiples of a beat.
     pub(crate) fn lend<const N: usize>(
         &mut self,
         reads: [(Source, usize); N],
         writes: [(u64, usize); N],
     ) -> Option<Lent<'_, N>> {
-        if self.external.is_some() {
+        if self.external.is_some() || self.guard_is_used {
             return None;
         }
         let mut views: [&[Beat]; N] = [&[]; N];

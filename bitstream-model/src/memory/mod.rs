@@ -17,8 +17,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use self::external::{DeviceMemory, ExternalMemory};
 use crate::cast::index;
+use crate::config::BoardConfig;
 use crate::config::quirks::{Coherency, stale_from};
 use pgs_interface::address_map::{DDR_HIGH, DDR_LOW};
+use pgs_interface::axi_dma::Direction;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
 /// The device's right to a buffer.
@@ -145,6 +147,9 @@ pub(crate) struct Memory {
     /// Released ranges, guard included. They are reused only when no other memory is left, so that
     /// a use after release reaches no other buffer.
     released: Vec<Range<u64>>,
+    /// Memory behind the fence, for one range at a time.
+    guard: Option<Range<u64>>,
+    guard_is_used: bool,
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
@@ -155,6 +160,15 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
+    /// Memory of a board.
+    pub(crate) fn of(config: &BoardConfig) -> Self {
+        let BoardConfig { fence, address_width, quirks, .. } = config;
+        let memory = Self::new(*address_width, quirks.coherency);
+        let Some(fence) = fence else { return memory };
+        let guard = fence.guard().filter(|_| !quirks.no_guard);
+        Self { low: fence.base()..fence.end(), high: 0..0, guard, ..memory }
+    }
+
     /// Memory for DMAs with addresses of `address_width` bits.
     pub(crate) fn new(address_width: u32, coherency: Coherency) -> Self {
         // The kernel and the rest of the system keep the first gigabyte of low and the last of
@@ -165,6 +179,8 @@ impl Memory {
             low: DDR_LOW.start + SYSTEM..DDR_LOW.end,
             high: DDR_HIGH.start..DDR_HIGH.end - SYSTEM,
             released: Vec::new(),
+            guard: None,
+            guard_is_used: false,
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             coherency,
@@ -180,6 +196,8 @@ impl Memory {
             low: 0..0,
             high: 0..0,
             released: Vec::new(),
+            guard: None,
+            guard_is_used: false,
             address_limit: 0,
             next_is_high: false,
             coherency: Coherency::Coherent,
@@ -204,10 +222,48 @@ impl Memory {
         };
         let address = free.start;
         free.start += taken;
+        self.place(address, bytes, content);
+        Ok(address)
+    }
+
+    fn place(&mut self, address: u64, bytes: u64, content: Content) {
         let position = self.regions.partition_point(|(start, _)| *start < address);
         let region = Region { bytes, content, grant: 0, cached: None };
         self.regions.insert(position, (address, region));
-        Ok(address)
+    }
+
+    fn insert_in_guard(&mut self, bytes: u64, content: Content) -> Result<u64, MemoryError> {
+        let guard = self.guard.clone().unwrap_or_default();
+        if self.guard_is_used || bytes > guard.end - guard.start {
+            return Err(MemoryError::Exhausted { bytes, limit: guard.end });
+        }
+        self.guard_is_used = true;
+        self.place(guard.start, bytes, content);
+        Ok(guard.start)
+    }
+
+    /// The memory behind the fence.
+    pub(crate) fn guard(&self) -> Option<Range<u64>> {
+        self.guard.clone()
+    }
+
+    pub(crate) fn allocate_guard(
+        &mut self,
+        beats: usize,
+    ) -> Result<(u64, Box<[Beat]>), MemoryError> {
+        let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
+        let address = self.insert_in_guard(bytes, Content::Cpu)?;
+        Ok((address, vec![Beat::default(); beats].into()))
+    }
+
+    pub(crate) fn allocate_guard_shared(
+        &mut self,
+        words: usize,
+    ) -> Result<(u64, Arc<[AtomicU32]>), MemoryError> {
+        let bytes = (words as u64).saturating_mul(4);
+        let shared: Arc<[AtomicU32]> = (0..words).map(|_| AtomicU32::new(0)).collect();
+        let address = self.insert_in_guard(bytes, Content::Words(Arc::clone(&shared)))?;
+        Ok((address, shared))
     }
 
     pub(crate) fn allocate(&mut self, beats: usize) -> Result<(u64, Box<[Beat]>), MemoryError> {
@@ -302,6 +358,10 @@ impl Memory {
     pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
         let position = self.index_of_start(address)?;
         let (_, region) = self.regions.remove(position);
+        if self.guard.as_ref().is_some_and(|guard| guard.start == address) {
+            self.guard_is_used = false;
+            return Ok(());
+        }
         self.released.retain(|range| !range.is_empty());
         self.released.push(address..address + region.bytes.next_multiple_of(GUARD) + GUARD);
         Ok(())
@@ -379,7 +439,21 @@ impl Memory {
         }
     }
 
-    /// Whether the device may write these beats in a buffer that it owns.
+    /// Checks that the device may read or write these beats.
+    pub(crate) fn check(
+        &mut self,
+        direction: Direction,
+        address: u64,
+        count: usize,
+    ) -> Result<(), Denied> {
+        match (&self.external, direction) {
+            (Some(external), _) => external.check(address, (count * BEAT_BYTES) as u64),
+            (None, Direction::Mm2s) => self.owned(address, count).map(drop),
+            (None, Direction::S2mm) => self.beats_mut(address, count).map(drop),
+        }
+    }
+
+    /// Whether the device may write these beats in a buffer that it owns, and the fence is no matter.
     pub(crate) fn may_write(&self, address: u64, count: usize) -> bool {
         let Ok((region, offset)) = self.find(address, (count * BEAT_BYTES) as u64) else {
             return false;
@@ -387,15 +461,7 @@ impl Memory {
         let Content::Device(beats, DeviceAccess::Write, granted) = &region.content else {
             return false;
         };
-        granted_range(beats, *granted, offset, count).is_some()
-    }
-
-    /// Checks that the device may write these beats.
-    pub(crate) fn check_write(&mut self, address: u64, count: usize) -> Result<(), Denied> {
-        match &self.external {
-            Some(external) => external.check(address, (count * BEAT_BYTES) as u64),
-            None => self.beats_mut(address, count).map(|_| ()),
-        }
+        granted_range(beats, *granted, offset, count).is_some() && !self.guard_is_used
     }
 
     /// Lets `fill` write beats for the device, if it may write them. The address is a multiple of a

@@ -35,7 +35,17 @@ pub(crate) struct Ring {
 
 impl Ring {
     pub(crate) fn new(host: &Host, core: usize, direction: Direction, slots: usize) -> Self {
-        let (address, words) = host.port.allocate_shared(slots * WORDS).expect("there is room");
+        let memory = host.port.allocate_shared(slots * WORDS).expect("there is room");
+        Self::on(memory, core, direction)
+    }
+
+    /// A ring on these words.
+    pub(crate) fn on(
+        (address, words): (u64, Arc<[AtomicU32]>),
+        core: usize,
+        direction: Direction,
+    ) -> Self {
+        let slots = words.len() / WORDS;
         let ring = Self { core, direction, address, words, slots, next: 0 };
         for slot in 0..slots {
             ring.link(slot, ring.at((slot + 1) % slots));

@@ -2,14 +2,14 @@
 //! interrupt line. After a reset the board works as before.
 
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
-use pgs_interface::axi_dma::{DMACR, dmacr, dmasr};
+use pgs_interface::axi_dma::{CHANNEL_REGISTERS, DMACR, dmacr, dmasr};
 use pgs_interface::control::{self, ErrorCode};
 use pgs_interface::profile::WINDOWED;
 
 use crate::common;
 use crate::common::scene::{Step, bits};
 use crate::common::sg::{Failure, Machine};
-use crate::common::{BOTH, CORES};
+use crate::common::{BOTH, CORES, Host};
 
 fn machine() -> Machine {
     Machine::new(BoardConfig::default())
@@ -233,6 +233,31 @@ fn another_bitstream_names_itself_and_has_forgotten_the_step() {
     assert_eq!(machine.host.control(control::IDENTIFICATION), 0x1234);
     assert_eq!(machine.host.control(control::VERSION), 0);
     assert!(dmasr::HALTED.is_set(machine.host.status(0, Direction::Mm2s)));
+}
+
+#[test]
+fn the_same_bitstream_again_has_forgotten_everything_but_memory() {
+    let text = "reloaded@dma3.mm2s,phase=contact2,beat=9";
+    for text in [text, "reloaded"] {
+        assert_eq!(fails(text), Failure::Deadline, "{text}");
+    }
+    let mut machine = machine();
+    machine.host.board.inject(plan(text));
+    machine.step(&scene()).map(|_| ()).expect_err(text);
+    let new = Host::new(BoardConfig::default());
+    for (core, direction) in (0..CORES).flat_map(|core| BOTH.map(|direction| (core, direction))) {
+        for register in CHANNEL_REGISTERS {
+            let [found, expected] =
+                [&machine.host, &new].map(|host| host.read(core, direction, register));
+            assert_eq!(found, expected, "dma{core} {direction} {}", register.name);
+        }
+    }
+    for register in control::REGISTERS {
+        let [found, expected] = [&machine.host, &new].map(|host| host.control(*register));
+        assert_eq!(found, expected, "{}", register.name);
+    }
+    // The load and the first pass were over.
+    assert!([0, 1].iter().all(|slot| machine.mm2s[3].status(*slot) >> 31 == 1));
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod common;
 mod accelerator;
 mod direct;
 mod faults;
+mod fence;
 mod float_environment;
 mod formats;
 mod profiles;

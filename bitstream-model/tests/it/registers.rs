@@ -325,7 +325,7 @@ fn the_doorbell_is_taildesc_with_32_bit_addresses_and_taildesc_msb_with_wider_on
 #[test]
 fn reserved_offsets_read_0_ignore_writes_and_are_violations() {
     let dma = [0x20, 0x24, 0x2C, 0x50, 0x54, 0x5C, 0x60, 0xFFFC].map(|at| dma_base(1) + at);
-    let control = [0x14, 0x7C, 0x150, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
+    let control = [0x14, 0x7C, 0x158, 0x1AC, 0x1C4, 0x800, 0xFFC].map(|at| CONTROL_BASE + at);
     for address in dma.into_iter().chain(control) {
         let host = Host::lenient(BoardConfig::default());
         host.port.write32(address, u32::MAX);
@@ -416,7 +416,7 @@ fn time_can_run_to_its_end_without_harm() {
 fn misread_identity_is_impossible_on_a_live_board() {
     let host = Host::new(BoardConfig::default());
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
-    assert_eq!(host.control(control::VERSION), 0x0001_0002);
+    assert_eq!(host.control(control::VERSION), 0x0001_0003);
     assert_eq!(host.control(control::PROFILE), 1);
     // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction, warm start, no poses.
     assert_eq!(host.control(control::FEATURES), 0b101_1110_1011);
@@ -433,7 +433,7 @@ fn misread_identity_is_impossible_on_a_live_board() {
     assert_eq!(host.control(control::DMA), (40 << 8) | 26);
     assert_eq!(host.control(control::NUMBERS), 0, "f32 throughout");
     for register in control::REGISTERS.iter().filter(|register| {
-        (control::IDENTIFICATION.offset..=control::NUMBERS.offset).contains(&register.offset)
+        (control::IDENTIFICATION.offset..=control::FENCE_SIZE.offset).contains(&register.offset)
     }) {
         let before = host.control(*register);
         host.set_control(*register, !before);

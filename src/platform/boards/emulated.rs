@@ -23,6 +23,55 @@ impl EmulatedPlatform {
     }
 }
 
+/// The guard of the emulated board.
+#[derive(Debug)]
+struct EmulatedGuard {
+    board: EmulatedPlatform,
+    extent: (u64, u64),
+}
+
+impl DmaMemorySource for EmulatedGuard {
+    fn name(&self) -> &str {
+        "guard"
+    }
+
+    fn extent(&self) -> Option<(u64, u64)> {
+        Some(self.extent)
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
+        let allocated = self.board.port.allocate_guard(beats);
+        let (address, beats) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, DmaMemory::Heap(beats)))
+    }
+
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        let bytes = words.saturating_mul(4) as u64;
+        let allocated = self.board.port.allocate_guard_shared(words);
+        let (address, words) = allocated.map_err(refused("allocate", "bytes", bytes))?;
+        Ok((address, SharedMemory::Heap(words)))
+    }
+
+    fn hand_over(
+        &self,
+        address: u64,
+        memory: DmaMemory,
+        used: usize,
+        access: Access,
+    ) -> Result<(), PlatformError> {
+        self.board.hand_over(address, memory, used, access)
+    }
+
+    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        self.board.take_back(address)
+    }
+
+    fn release(&self, address: u64) -> Result<(), PlatformError> {
+        self.board.release(address)
+    }
+}
+
 /// A register region of the emulated board.
 #[derive(Debug)]
 struct EmulatedWindow {
@@ -54,6 +103,10 @@ fn refused<E: std::error::Error + Send + Sync + 'static>(
 }
 
 impl DmaMemorySource for EmulatedPlatform {
+    fn name(&self) -> &str {
+        "emulated"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
         let allocated = self.port.allocate(beats);
@@ -107,6 +160,13 @@ impl Platform for EmulatedPlatform {
 
     fn memory(&self) -> &dyn DmaMemorySource {
         self
+    }
+
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
+        let board = Self { port: self.port.clone() };
+        Ok(self.port.guard().map(|guard| -> Box<dyn DmaMemorySource> {
+            Box::new(EmulatedGuard { board, extent: (guard.start, guard.end - guard.start) })
+        }))
     }
 
     fn now(&self) -> Duration {

@@ -20,6 +20,7 @@ use super::lock::LockedFile;
 use super::mapped::Mapping;
 use super::sysfs::{is_gone, read_if_present, read_number};
 use super::system::page_bytes;
+use super::uio_device::NodeEntry;
 use super::uio_listing::uio_listing;
 use crate::platform::memory::u_dma_buf::directory;
 use crate::platform::{PlatformError, RegisterMap, ReservedMemory, System, u_dma_buf_names};
@@ -72,6 +73,8 @@ pub(crate) struct DevMem {
     file: Arc<LockedFile>,
     /// Ranges that may be mapped.
     windows: Vec<Range<u64>>,
+    /// The UIO nodes that show memory of the windows.
+    nodes: Vec<NodeEntry>,
     /// Ranges that the kernel lists as its own, with its lines for them.
     kernel: Vec<(Range<u64>, String)>,
 }
@@ -82,9 +85,16 @@ impl DevMem {
         let first = windows.first().map_or(0, |window| window.start);
         let file = LockedFile::open(&system.dev.join("mem"), nix::libc::O_SYNC)
             .map_err(|error| refused("opened", first, error))?;
-        let file = Arc::new(file.with(lock_others(system, &windows)?));
+        let (others, nodes) = lock_others(system, &windows)?;
+        let file = Arc::new(file.with(others));
         let kernel = kernel_memory(&read_if_present(&system.iomem)?.unwrap_or_default());
-        Ok(Self { file, windows, kernel })
+        Ok(Self { file, windows, nodes, kernel })
+    }
+
+    /// Makes sure that the UIO nodes which show memory of the windows are still there: with its
+    /// node the logic may lose its clock.
+    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+        self.nodes.iter().try_for_each(NodeEntry::check)
     }
 
     /// Maps a range.
@@ -117,7 +127,11 @@ impl DevMem {
 
 /// Locks the device files that show memory of these windows too. A device without a file cannot be
 /// opened and needs no lock.
-fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile>, PlatformError> {
+/// Returns the locks, and the UIO nodes among these devices.
+fn lock_others(
+    system: &System,
+    windows: &[Range<u64>],
+) -> Result<(Vec<LockedFile>, Vec<NodeEntry>), PlatformError> {
     let shown = |start: u64, bytes: u64| {
         let shown = start..start.saturating_add(bytes);
         windows.iter().any(|window| overlap(window, &shown))
@@ -125,8 +139,10 @@ fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile
     let listing = uio_listing(&system.uio)?;
     // A node with an unreadable description may show memory of the windows.
     let mut names: Vec<_> = listing.unreadable.into_iter().map(|node| node.device).collect();
+    let mut nodes = Vec::new();
     for node in listing.nodes {
         if node.maps.iter().any(|map| shown(map.address, map.bytes)) {
+            nodes.push(NodeEntry::open(system, &node)?);
             names.push(node.device);
         }
     }
@@ -147,7 +163,7 @@ fn lock_others(system: &System, windows: &[Range<u64>]) -> Result<Vec<LockedFile
             Err(error) => return Err(error),
         }
     }
-    Ok(locked)
+    Ok((locked, nodes))
 }
 
 /// Tells missing rights and the kernel's restrictions from other failures.
@@ -305,6 +321,23 @@ mod tests {
         assert_eq!(busy(), [""; 0], "a refusal keeps nothing");
         fs::remove_file(system.dev.join("uio1")).expect("removed");
         open(&system, &windows).expect("what cannot be opened is in nobody's hands");
+    }
+
+    #[test]
+    fn a_node_of_which_one_region_lies_in_the_windows_is_kept_and_asked() {
+        let (_root, system, windows) = memory();
+        let maps = [("other", 0xFD0B_0000, 0x1000), ("dma0", 0, 0x1_0000), ("more", 0xA0_0000, 16)];
+        add_node(&system, 0, "foreign", &maps);
+        add_node(&system, 1, "outside", &maps[..1]);
+        let mem = open(&system, &windows).expect("opened");
+        let error = UioDevice::open_in(&system, "foreign").expect_err("its region is in use");
+        assert!(matches!(error, PlatformError::Busy { .. }), "{error}");
+        UioDevice::open_in(&system, "outside").expect("nobody has it");
+        fs::write(system.uio.join("uio1/name"), "").expect("emptied");
+        mem.check().expect("no node of these windows");
+        fs::write(system.uio.join("uio0/name"), "").expect("emptied");
+        let error = mem.check().expect_err("its overlay was removed").to_string();
+        assert!(error.contains("\"foreign\" (uio0) went away"), "{error}");
     }
 
     #[test]

@@ -9,7 +9,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::sysfs::{numbered, read, read_if_present};
+use super::sysfs::{Attribute, numbered, read};
 use crate::platform::{PlatformError, System};
 
 /// The state of programmable logic that is ready.
@@ -114,24 +114,61 @@ pub fn find_manager(
 /// # Errors
 /// [`PlatformError::NoBitstream`], as [`find_manager`], or the state cannot be read.
 pub fn require_bitstream(system: &System, choice: &ManagerChoice) -> Result<(), PlatformError> {
-    let class = &system.fpga_manager;
-    let Some(manager) = find_manager(class, choice)? else {
-        if *choice == ManagerChoice::Unasked {
-            log::info!("whether a bitstream is loaded is not asked for, as wished");
-        } else {
-            log::info!("no FPGA manager in {}: is a bitstream loaded?", class.display());
-        }
-        return Ok(());
-    };
-    let path = manager.directory.join("state");
-    // The managers of some kernels have no state.
-    match read_if_present(&path)? {
-        Some(state) if state == OPERATING => Ok(()),
-        Some(found) => Err(PlatformError::NoBitstream { path, found }),
-        None => {
+    LogicState::open(system, choice).map(drop)
+}
+
+/// The state of programmed logic, by its manager.
+#[derive(Debug)]
+pub(crate) struct LogicState(Option<Attribute>);
+
+impl LogicState {
+    /// As [`require_bitstream`]; the state can be asked again.
+    pub(crate) fn open(system: &System, choice: &ManagerChoice) -> Result<Self, PlatformError> {
+        let class = &system.fpga_manager;
+        let Some(manager) = find_manager(class, choice)? else {
+            if *choice == ManagerChoice::Unasked {
+                log::info!("whether a bitstream is loaded is not asked for, as wished");
+            } else {
+                log::info!("no FPGA manager in {}: is a bitstream loaded?", class.display());
+            }
+            return Ok(Self(None));
+        };
+        let path = manager.directory.join("state");
+        let state = Attribute::open(path.clone())?;
+        if state.is_none() {
+            // The managers of some kernels have no state.
             log::info!("there is no {}: is a bitstream loaded?", path.display());
-            Ok(())
         }
+        let this = Self(state);
+        match this.other()? {
+            Some(found) => Err(PlatformError::NoBitstream { path, found }),
+            None => Ok(this),
+        }
+    }
+
+    /// Makes sure that the logic is still programmed: at most one system call.
+    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+        match (self.other()?, &self.0) {
+            (Some(found), Some(state)) => {
+                let path = state.path().display();
+                let why = format!("{path} went from {OPERATING:?} to {found:?}");
+                Err(PlatformError::Lost { why })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The state, unless it is [`OPERATING`] or there is nobody to ask, as after the manager's own
+    /// driver was unbound.
+    fn other(&self) -> Result<Option<String>, PlatformError> {
+        let Some(state) = &self.0 else { return Ok(None) };
+        state.read(|text| {
+            let other = text?.trim_ascii();
+            if other == OPERATING.as_bytes() {
+                return None;
+            }
+            Some(String::from_utf8_lossy(other).into_owned())
+        })
     }
 }
 

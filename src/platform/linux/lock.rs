@@ -83,7 +83,8 @@ impl DeviceLock {
     /// Locks a device file.
     ///
     /// # Errors
-    /// [`PlatformError::Busy`] if it is locked already; the file cannot be opened to read and write.
+    /// [`PlatformError::Busy`] if it is locked already; the file cannot be opened to read and
+    /// write.
     pub fn new(path: &Path) -> Result<Self, PlatformError> {
         Ok(Self { _file: LockedFile::open(path, nix::libc::O_NONBLOCK)? })
     }

@@ -9,8 +9,12 @@ use memmap2::{MmapOptions, MmapRaw};
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
 use super::lock::LockedFile;
+use super::system::require_bytes;
 use crate::platform::memory::copy::Doublewords;
 use crate::platform::{PlatformError, RegisterWindow};
+
+/// The longest mapping, bytes: all physical addresses of the chip (UG1085, 40 bits).
+const LONGEST: u64 = 1 << 40;
 
 /// A region of a device file, mapped readable and writable and shared with the device.
 ///
@@ -55,14 +59,16 @@ impl Mapping {
     ) -> Result<Self, PlatformError> {
         let path = || lock.path().to_owned();
         let error = |source| PlatformError::File { act: "map", path: path(), source };
-        let invalid = || {
-            let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
-            error(io::Error::new(io::ErrorKind::InvalidData, text))
-        };
-        let length = start.checked_add(bytes).ok_or_else(invalid)?;
         if !start.is_multiple_of(BEAT_BYTES) || bytes < 4 {
-            return Err(invalid());
+            let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
+            return Err(error(io::Error::new(io::ErrorKind::InvalidData, text)));
         }
+        let length = start.checked_add(bytes).filter(|length| *length as u64 <= LONGEST);
+        let length = length.ok_or_else(|| PlatformError::TooLarge {
+            region: path().display().to_string(),
+            bytes: bytes as u64,
+        })?;
+        require_bytes(file, lock.path(), file_offset.saturating_add(length as u64))?;
         let map =
             MmapOptions::new().offset(file_offset).len(length).map_raw(file).map_err(error)?;
         Ok(Self { map, start, bytes, _lock: Arc::clone(lock) })
@@ -265,9 +271,27 @@ mod tests {
     #[test]
     fn what_cannot_be_a_region_is_an_error_that_names_the_file() {
         let file = file_of(&page());
-        for (start, bytes) in [(2, 16), (8, 16), (0, 0), (usize::MAX - 15, 4096)] {
+        let path = file.path().display().to_string();
+        for (start, bytes) in [(2, 16), (8, 16), (0, 0)] {
             let error = map(&file, start, bytes).expect_err("not a region").to_string();
-            assert!(error.contains(&file.path().display().to_string()), "{error}");
+            assert!(error.contains(&path), "{error}");
+        }
+        let past = usize::try_from(LONGEST).expect("64 bits") + 1;
+        for (start, bytes) in [(usize::MAX - 15, 4096), (0, usize::MAX), (16, 1 << 62), (0, past)] {
+            let error = map(&file, start, bytes).expect_err("too large");
+            assert!(matches!(error, PlatformError::TooLarge { .. }), "{error}");
+            let error = error.to_string();
+            assert!(error.contains(&path) && error.contains("correct its `reg`"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_plain_file_that_is_shorter_than_its_region_is_not_mapped() {
+        for (length, bytes) in [(0, 4096), (100, 4096), (4096, 4112)] {
+            let file = file_of(&page()[..length]);
+            let error = map(&file, 0, bytes).expect_err("SIGBUS at an access");
+            assert!(matches!(error, PlatformError::NotADevice { .. }), "{error}");
+            assert!(error.to_string().contains(&format!("of {length} bytes, expected")), "{error}");
         }
     }
 

@@ -1,7 +1,8 @@
 //! Reads the small text files in which the kernel describes devices.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
+use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
@@ -67,6 +68,45 @@ pub(crate) fn is_gone(error: &PlatformError) -> bool {
         || source.raw_os_error() == Some(Errno::ENODEV as i32))
 }
 
+/// An attribute that is kept open. It belongs to the device that had it at the opening: when that
+/// is gone, the attribute is too, even if another device has its path by then.
+#[derive(Debug)]
+pub(crate) struct Attribute {
+    file: File,
+    path: PathBuf,
+}
+
+/// Longer texts are cut off.
+const TEXT_BYTES: usize = 64;
+
+impl Attribute {
+    /// Opens an attribute that may be absent.
+    pub(crate) fn open(path: PathBuf) -> Result<Option<Self>, PlatformError> {
+        match File::open(&path) {
+            Ok(file) => Ok(Some(Self { file, path })),
+            Err(source) if source.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(PlatformError::File { act: "open", path, source }),
+        }
+    }
+
+    /// Hands over its bytes of now; `None` once its device is gone. One system call, no allocation.
+    pub(crate) fn read<T>(&self, see: impl FnOnce(Option<&[u8]>) -> T) -> Result<T, PlatformError> {
+        let mut text = [0; TEXT_BYTES];
+        match self.file.read_at(&mut text, 0) {
+            Ok(bytes) => Ok(see(Some(&text[..bytes]))),
+            Err(source) => {
+                let error = PlatformError::File { act: "read", path: self.path.clone(), source };
+                if is_gone(&error) { Ok(see(None)) } else { Err(error) }
+            }
+        }
+    }
+
+    /// Where it lies.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,6 +125,22 @@ mod tests {
                 (found, _) => panic!("{text:?} gave {found:?}"),
             }
         }
+    }
+
+    #[test]
+    fn an_attribute_that_is_kept_open_shows_its_text_of_now() {
+        let root = tempfile::tempdir().expect("a directory");
+        let path = root.path().join("state");
+        assert!(Attribute::open(path.clone()).expect("may be absent").is_none());
+        fs::write(&path, "operating\n").expect("written");
+        let state = Attribute::open(path.clone()).expect("opened").expect("there");
+        let text = || state.read(|text| text.map(<[u8]>::to_vec)).expect("read");
+        assert_eq!(text().as_deref(), Some(&b"operating\n"[..]));
+        fs::write(&path, "x".repeat(100)).expect("written");
+        assert_eq!(text().map(|text| text.len()), Some(64), "longer texts are cut off");
+        // ENODEV, of a device that is gone, comes from a real kernel only: tools/guest asks it.
+        fs::write(&path, "").expect("emptied");
+        assert_eq!(text().as_deref(), Some(&[][..]));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-use crate::platform::PlatformError;
+use crate::platform::{PlatformError, UioMap, UioNode};
 
 /// Where Linux lists the UIO nodes.
 pub const UIO_CLASS: &str = "/sys/class/uio";
@@ -55,12 +55,27 @@ pub(crate) fn open_device(path: &Path, flags: i32) -> Result<File, PlatformError
     file.map_err(|source| obstacle(path, source))
 }
 
-/// Tries whether a device file can be opened to read and write.
+/// Tries whether the device file of a node can be opened to read and write.
 ///
 /// # Errors
 /// Why not; [`PlatformError::next_step`] says what to do.
-pub fn try_device(path: &Path) -> Result<(), PlatformError> {
-    open_device(path, nix::libc::O_NONBLOCK).map(drop)
+pub fn try_node(system: &System, node: &UioNode) -> Result<(), PlatformError> {
+    let path = system.dev.join(&node.device);
+    let file = open_device(&path, nix::libc::O_NONBLOCK)?;
+    let page = page_bytes(&path)?;
+    let end = |map: &UioMap| (u64::from(map.index) * page).saturating_add(map.bytes);
+    require_bytes(&file, &path, node.maps.iter().map(end).max().unwrap_or(0))
+}
+
+/// Refuses a plain file that is shorter than the device whose place it takes: an access past its
+/// end ends the process.
+pub(crate) fn require_bytes(file: &File, path: &Path, expected: u64) -> Result<(), PlatformError> {
+    let metadata = file.metadata().map_err(|source| obstacle(path, source))?;
+    if metadata.is_file() && metadata.len() < expected {
+        let (path, found) = (path.to_owned(), metadata.len());
+        return Err(PlatformError::NotADevice { path, expected, found });
+    }
+    Ok(())
 }
 
 /// Why a device file could not be opened.
@@ -87,6 +102,8 @@ pub(crate) fn page_bytes(path: &Path) -> Result<u64, PlatformError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::platform::uio_fake::accelerator;
+    use crate::platform::uio_nodes;
 
     #[test]
     fn the_default_is_the_running_system() {
@@ -96,6 +113,22 @@ mod tests {
         assert_eq!(udmabuf, Path::new("/sys/class/udmabuf"));
         assert_eq!(fpga_manager, Path::new("/sys/class/fpga_manager"));
         assert_eq!((dev.as_path(), iomem.as_path()), (Path::new("/dev"), Path::new("/proc/iomem")));
+    }
+
+    #[test]
+    fn a_plain_file_is_no_device_file_of_a_node_that_is_longer() {
+        let (_root, system) = accelerator();
+        let node = uio_nodes(&system.uio).expect("listed").remove(0);
+        try_node(&system, &node).expect("long enough to be mapped");
+        for length in [0, 1, 0x5000] {
+            let file = File::create(system.dev.join(&node.device)).expect("emptied");
+            file.set_len(length).expect("resized");
+            let error = try_node(&system, &node).expect_err("too short");
+            assert!(
+                matches!(error, PlatformError::NotADevice { found, .. } if found == length),
+                "{error}"
+            );
+        }
     }
 
     #[test]

@@ -11,12 +11,14 @@ use std::io::{self, Read as _, Write as _};
 use std::os::fd::AsFd as _;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use super::lock::LockedFile;
+use super::sysfs::Attribute;
 use super::uio_listing::uio_listing;
 use super::uio_window::Claims;
 use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
@@ -26,6 +28,10 @@ use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
 /// The interrupt protocol of a level-triggered device: acknowledge the interrupt in the device,
 /// then [`unmask`](Self::unmask), then read the device's status once more (an event in between
 /// raised no interrupt), then [`wait_interrupt`](Self::wait_interrupt).
+///
+/// A driver can be unbound from the node while it is open, for example by removing the overlay. The
+/// windows stay mapped, and an access to logic that has lost its clock hangs the processor: each
+/// call here then ends with [`PlatformError::Lost`], after which no register may be touched.
 #[derive(Debug)]
 pub struct UioDevice {
     node: UioNode,
@@ -33,6 +39,35 @@ pub struct UioDevice {
     tree: PathBuf,
     file: Arc<LockedFile>,
     claims: Claims,
+    entry: NodeEntry,
+    /// Whether the kernel has shown that the node has an interrupt.
+    interrupt: AtomicBool,
+}
+
+/// The entry of a UIO node in sysfs, which the kernel removes with the node.
+#[derive(Debug)]
+pub(crate) struct NodeEntry {
+    name: Option<Attribute>,
+    text: String,
+}
+
+impl NodeEntry {
+    /// The entry of a node of the listing.
+    pub(crate) fn open(system: &System, node: &UioNode) -> Result<Self, PlatformError> {
+        let name = Attribute::open(system.uio.join(&node.device).join("name"))?;
+        Ok(Self { name, text: format!("UIO node {:?} ({})", node.name, node.device) })
+    }
+
+    /// Makes sure that the node is still there: one system call.
+    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+        let Some(name) = &self.name else { return Err(self.lost()) };
+        let there = name.read(|text| text.is_some_and(|text| !text.is_empty()))?;
+        if there { Ok(()) } else { Err(self.lost()) }
+    }
+
+    fn lost(&self) -> PlatformError {
+        PlatformError::Lost { why: format!("{} went away", self.text) }
+    }
 }
 
 impl UioDevice {
@@ -65,7 +100,25 @@ impl UioDevice {
         // after `poll`.
         let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
         let tree = system.uio.join(&node.device).join("device/of_node");
-        Ok(Self { node, tree, file: Arc::new(file), claims: Claims::default() })
+        let entry = NodeEntry::open(system, &node)?;
+        let (file, claims) = (Arc::new(file), Claims::default());
+        Ok(Self { node, tree, file, claims, entry, interrupt: AtomicBool::new(false) })
+    }
+
+    /// Makes sure that the kernel has not taken the node away. A node that has shown an interrupt
+    /// is asked by [`unmask`](Self::unmask), another one by its entry in sysfs.
+    ///
+    /// # Errors
+    /// [`PlatformError::Lost`] if it has.
+    pub fn check(&self) -> Result<(), PlatformError> {
+        if self.interrupt.load(Ordering::Relaxed) {
+            match self.unmask() {
+                // Its driver cannot mask.
+                Err(PlatformError::NoInterrupt { .. }) => {}
+                asked => return asked,
+            }
+        }
+        self.entry.check()
     }
 
     /// The kernel's description of the node.
@@ -93,20 +146,24 @@ impl UioDevice {
     /// `timeout` passes first. The interrupt is masked afterwards.
     ///
     /// # Errors
-    /// [`PlatformError::NoInterrupt`] if the node has none.
+    /// [`PlatformError::NoInterrupt`] if the node has none, [`PlatformError::Lost`] if it went
+    /// away.
     pub fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
         let started = Instant::now();
         loop {
             let remaining = timeout.saturating_sub(started.elapsed());
             let readable = wait_readable(self.file.file(), remaining)
-                .map_err(|errno| self.error("wait for", errno.into()))?;
+                .map_err(|errno| self.failed("wait for", errno.into()))?;
             let mut count = [0; 4];
             match self.file.file().read(&mut count) {
-                Ok(4) => return Ok(Some(u32::from_ne_bytes(count))),
+                Ok(4) => {
+                    self.interrupt.store(true, Ordering::Relaxed);
+                    return Ok(Some(u32::from_ne_bytes(count)));
+                }
                 Ok(found) => {
                     let text = format!("expected 4 bytes, found {found}");
                     let source = io::Error::new(io::ErrorKind::UnexpectedEof, text);
-                    return Err(self.error("read", source));
+                    return Err(self.failed("read", source));
                 }
                 // Another reader took the interrupt, or a signal came.
                 Err(error)
@@ -115,11 +172,12 @@ impl UioDevice {
                         io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
                     ) =>
                 {
+                    self.interrupt.store(true, Ordering::Relaxed);
                     if !readable || remaining.is_zero() {
                         return Ok(None);
                     }
                 }
-                Err(error) => return Err(self.error("read", error)),
+                Err(error) => return Err(self.refused("read", error)),
             }
         }
     }
@@ -127,7 +185,7 @@ impl UioDevice {
     /// Lets the next interrupt through.
     ///
     /// # Errors
-    /// [`PlatformError::NoInterrupt`] if the node has none.
+    /// As [`wait_interrupt`](Self::wait_interrupt).
     pub fn unmask(&self) -> Result<(), PlatformError> {
         self.control(1)
     }
@@ -135,31 +193,45 @@ impl UioDevice {
     /// Keeps the interrupt from coming.
     ///
     /// # Errors
-    /// [`PlatformError::NoInterrupt`] if the node has none.
+    /// As [`wait_interrupt`](Self::wait_interrupt).
     pub fn mask(&self) -> Result<(), PlatformError> {
         self.control(0)
     }
 
     fn control(&self, enable: u32) -> Result<(), PlatformError> {
         match self.file.file().write(&enable.to_ne_bytes()) {
-            Ok(4) => Ok(()),
+            Ok(4) => {
+                self.interrupt.store(true, Ordering::Relaxed);
+                Ok(())
+            }
             Ok(written) => {
                 let text = format!("expected to write 4 bytes, wrote {written}");
-                Err(self.error("write", io::Error::new(io::ErrorKind::WriteZero, text)))
+                Err(self.failed("write", io::Error::new(io::ErrorKind::WriteZero, text)))
             }
-            Err(error) => Err(self.error("write", error)),
+            Err(error) => Err(self.refused("write", error)),
         }
     }
 
-    fn error(&self, act: &'static str, source: io::Error) -> PlatformError {
-        // EIO: no interrupt in the device tree; ENOSYS: a driver that cannot mask.
-        match source.raw_os_error().map(Errno::from_raw) {
+    /// The meaning of the kernel's refusal. Without a driver behind the node a read gives EIO and a
+    /// write EINVAL; without an interrupt in the device tree both give EIO.
+    fn refused(&self, act: &'static str, source: io::Error) -> PlatformError {
+        let errno = source.raw_os_error().map(Errno::from_raw);
+        let unbound = matches!(errno, Some(Errno::EIO | Errno::EINVAL));
+        if unbound && (self.interrupt.load(Ordering::Relaxed) || self.entry.check().is_err()) {
+            return self.entry.lost();
+        }
+        match errno {
+            // ENOSYS: a driver that cannot mask.
             Some(Errno::EIO | Errno::ENOSYS) => PlatformError::NoInterrupt {
                 node: self.node.name.clone(),
                 device: self.node.device.clone(),
             },
-            _ => PlatformError::File { act, path: self.file.path().to_owned(), source },
+            _ => self.failed(act, source),
         }
+    }
+
+    fn failed(&self, act: &'static str, source: io::Error) -> PlatformError {
+        PlatformError::File { act, path: self.file.path().to_owned(), source }
     }
 }
 
@@ -182,25 +254,65 @@ fn wait_readable(file: &File, timeout: Duration) -> Result<bool, Errno> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
+pub(crate) mod fake {
+    //! Other files in place of a node's device file.
+
     use std::os::fd::OwnedFd;
     use std::os::unix::net::UnixStream;
 
+    use super::*;
+
+    /// Reads and writes end with EIO, as of a node without an interrupt, or without a driver.
+    pub(crate) const EIO: &str = "/proc/thread-self/mem";
+    /// Writes end with EINVAL, as of a node without a driver.
+    pub(crate) const EINVAL: &str = "/proc/thread-self/oom_score_adj";
+
+    /// Puts one end of a pair of sockets in its place. The other end plays the kernel.
+    pub(crate) fn give_interrupt(device: &mut UioDevice) -> UnixStream {
+        let (ours, kernel) = UnixStream::pair().expect("a pair");
+        ours.set_nonblocking(true).expect("set");
+        let file = File::from(OwnedFd::from(ours));
+        device.file =
+            Arc::new(LockedFile::of_file(file, "/dev/uio3".as_ref()).expect("nobody else has it"));
+        kernel
+    }
+
+    /// Puts a file that refuses in its place.
+    pub(crate) fn refuse(device: &mut UioDevice, file: &str) {
+        let until = Instant::now() + Duration::from_secs(10);
+        // Each thread has its own; a program that another test starts may have an earlier lock.
+        device.file = loop {
+            match LockedFile::open(file.as_ref(), 0) {
+                Ok(file) => break Arc::new(file),
+                Err(error) => assert!(Instant::now() < until, "{error}"),
+            }
+            std::thread::yield_now();
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::net::UnixStream;
+
+    use super::fake::{EINVAL, EIO, give_interrupt, refuse};
     use super::*;
     use crate::platform::uio_fake::accelerator;
 
     const SHORT: Duration = Duration::from_millis(5);
     const LONG: Duration = Duration::from_secs(30);
 
-    /// A device whose file is one end of a pair of sockets; the other end plays the kernel.
+    /// A node that the kernel keeps, whatever becomes of its files.
+    fn device() -> UioDevice {
+        let (_root, system) = accelerator();
+        UioDevice::open_in(&system, "pgs").expect("opened")
+    }
+
     fn with_interrupt() -> (UioDevice, UnixStream) {
-        let (ours, kernel) = UnixStream::pair().expect("a pair");
-        ours.set_nonblocking(true).expect("set");
-        let node = UioNode { device: "uio0".to_owned(), name: "pgs".to_owned(), maps: Vec::new() };
-        let file = File::from(OwnedFd::from(ours));
-        let file = Arc::new(LockedFile::of_file(file, "/dev/uio0".as_ref()).expect("locked"));
-        (UioDevice { node, tree: PathBuf::new(), file, claims: Claims::default() }, kernel)
+        let mut device = device();
+        let kernel = give_interrupt(&mut device);
+        (device, kernel)
     }
 
     #[test]
@@ -256,14 +368,53 @@ mod tests {
     }
 
     #[test]
-    fn what_the_kernel_says_without_an_interrupt_is_named() {
-        let (device, _kernel) = with_interrupt();
-        for errno in [Errno::EIO, Errno::ENOSYS] {
-            let error = device.error("read", errno.into());
-            assert!(matches!(error, PlatformError::NoInterrupt { .. }), "{error}");
+    fn a_node_that_never_had_an_interrupt_goes_on_without() {
+        let mut device = device();
+        refuse(&mut device, EIO);
+        for _ in 0..2 {
+            for error in [device.unmask().err(), device.wait_interrupt(SHORT).err()] {
+                assert!(matches!(error, Some(PlatformError::NoInterrupt { .. })), "{error:?}");
+            }
+            device.check().expect("its entry is there");
         }
-        let other = device.error("read", Errno::EINVAL.into());
-        assert!(matches!(other, PlatformError::File { .. }), "{other}");
+        // A driver that cannot mask.
+        let error = device.refused("write", Errno::ENOSYS.into());
+        assert!(matches!(error, PlatformError::NoInterrupt { .. }), "{error}");
+        let error = device.refused("write", Errno::EINVAL.into());
+        assert!(matches!(error, PlatformError::File { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_node_that_had_an_interrupt_and_refuses_is_lost() {
+        type Act = fn(&UioDevice) -> Option<PlatformError>;
+        let acts: [(&str, Act); 4] = [
+            (EIO, |device| device.wait_interrupt(LONG).err()),
+            (EIO, |device| device.unmask().err()),
+            (EINVAL, |device| device.mask().err()),
+            (EINVAL, |device| device.check().err()),
+        ];
+        for (file, act) in acts {
+            let (mut device, mut kernel) = with_interrupt();
+            device.check().expect("the kernel has not said that it has one");
+            assert_eq!(device.wait_interrupt(Duration::ZERO).expect("none yet"), None);
+            device.check().expect("it is there");
+            kernel.read_exact(&mut [0; 4]).expect("asked by the second check");
+            refuse(&mut device, file);
+            let error = act(&device).expect("it refuses");
+            assert!(matches!(error, PlatformError::Lost { .. }), "{error}");
+            assert!(error.to_string().contains("UIO node \"pgs\" (uio3) went away"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_first_answer_of_a_node_that_is_gone_is_no_lack_of_an_interrupt() {
+        let (_root, system) = accelerator();
+        let mut device = UioDevice::open_in(&system, "pgs").expect("opened");
+        refuse(&mut device, EIO);
+        fs::write(system.uio.join("uio3/name"), "").expect("emptied");
+        for error in [device.wait_interrupt(LONG).err(), device.check().err()] {
+            assert!(matches!(error, Some(PlatformError::Lost { .. })), "{error:?}");
+        }
     }
 
     #[test]

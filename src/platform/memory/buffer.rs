@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use pgs_interface::fence::Fence;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 use pgs_support::Process;
 
@@ -24,6 +25,11 @@ use crate::platform::{
 pub(crate) struct BusAddress(u64);
 
 impl BusAddress {
+    /// All bits.
+    pub(crate) const fn raw(self) -> u64 {
+        self.0
+    }
+
     /// Bits 31:0.
     #[allow(clippy::cast_possible_truncation, reason = "the other half is high()")]
     pub(crate) const fn low(self) -> u32 {
@@ -33,6 +39,44 @@ impl BusAddress {
     /// Bits 63:32.
     pub(crate) const fn high(self) -> u32 {
         (self.0 >> 32) as u32
+    }
+}
+
+/// The memory that the DMA cores of a bitstream reach.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Reach {
+    /// Bits of their bus addresses.
+    pub(crate) address_width: u32,
+    /// The segment that holds them, if the bitstream has a fence.
+    pub(crate) fence: Option<Fence>,
+}
+
+impl Reach {
+    /// Refuses memory of `region` that the cores do not reach.
+    pub(crate) fn check(self, region: &str, address: u64, bytes: u64) -> Result<(), PlatformError> {
+        let Self { address_width, fence } = self;
+        let end = address.checked_add(bytes);
+        let reachable = match 1u64.checked_shl(address_width) {
+            Some(limit) => end.is_some_and(|end| end <= limit),
+            None => end.is_some(),
+        };
+        if !reachable {
+            return Err(PlatformError::OutOfReach { address, bytes, address_width });
+        }
+        match fence {
+            Some(fence) if !fence.contains(address, bytes) => {
+                let region = region.to_owned();
+                Err(PlatformError::OutsideFence { region, address, bytes, fence })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+impl From<u32> for Reach {
+    fn from(address_width: u32) -> Self {
+        Self { address_width, fence: None }
     }
 }
 
@@ -58,17 +102,11 @@ impl Allocation {
         platform: &Arc<dyn Platform>,
         address: u64,
         bytes: u64,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<Self, PlatformError> {
         let platform = Arc::clone(platform);
         let this = Self { platform, address, bytes, owner: Owner::Cpu, process: Process::this() };
-        let reachable = match 1u64.checked_shl(address_width) {
-            Some(end) => address.checked_add(bytes).is_some_and(|last| last <= end),
-            None => address.checked_add(bytes).is_some(),
-        };
-        if !reachable {
-            return Err(PlatformError::OutOfReach { address, bytes, address_width });
-        }
+        reach.check(this.platform.memory().name(), address, bytes)?;
         Ok(this)
     }
 
@@ -110,15 +148,15 @@ pub(crate) struct CpuBuffer {
 }
 
 impl CpuBuffer {
-    /// A buffer of `beats` that cores with addresses of `address_width` bits can reach.
+    /// A buffer of `beats` within reach.
     pub(crate) fn allocate(
         platform: &Arc<dyn Platform>,
         beats: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<Self, PlatformError> {
         let (address, memory) = platform.memory().allocate(beats)?;
         let bytes = (memory.beats().len() as u64) * BEAT_BYTES as u64;
-        let allocation = Allocation::new(platform, address, bytes, address_width)?;
+        let allocation = Allocation::new(platform, address, bytes, reach)?;
         Ok(Self { memory, allocation })
     }
 
@@ -187,11 +225,11 @@ impl SharedWords {
     pub(crate) fn allocate(
         platform: &Arc<dyn Platform>,
         words: usize,
-        address_width: u32,
+        reach: Reach,
     ) -> Result<Self, PlatformError> {
         let (address, memory) = platform.memory().allocate_shared(words)?;
         let bytes = (memory.len() as u64) * 4;
-        let allocation = Allocation::new(platform, address, bytes, address_width)?;
+        let allocation = Allocation::new(platform, address, bytes, reach)?;
         let this = Self { words: memory, allocation };
         for index in 0..words {
             this.write(index, 0);
@@ -238,7 +276,7 @@ mod tests {
     #[test]
     fn a_buffer_comes_back_with_its_beats_and_is_freed_once() {
         let (fake, platform) = platform();
-        let mut buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
+        let mut buffer = CpuBuffer::allocate(&platform, 4, 40.into()).expect("in reach");
         buffer.beats_mut()[3] = Beat([1, 2, 3, 4]);
         let device = buffer.into_device(4, Access::Read).expect("handed over");
         assert_eq!(fake.device.lock().expect("unpoisoned").len(), 1);
@@ -251,7 +289,7 @@ mod tests {
     #[test]
     fn a_buffer_dropped_with_the_device_is_not_freed() {
         let (fake, platform) = platform();
-        let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
+        let buffer = CpuBuffer::allocate(&platform, 4, 40.into()).expect("in reach");
         drop(buffer.into_device(4, Access::Write).expect("handed over"));
         assert!(fake.released.lock().expect("unpoisoned").is_empty());
     }
@@ -259,8 +297,8 @@ mod tests {
     #[test]
     fn a_buffer_that_is_left_to_the_device_is_not_freed() {
         let (fake, platform) = platform();
-        CpuBuffer::allocate(&platform, 4, 40).expect("in reach").leave_to_device();
-        let mut words = SharedWords::allocate(&platform, 16, 40).expect("in reach");
+        CpuBuffer::allocate(&platform, 4, 40.into()).expect("in reach").leave_to_device();
+        let mut words = SharedWords::allocate(&platform, 16, 40.into()).expect("in reach");
         words.leave_to_device();
         drop(words);
         assert!(fake.released.lock().expect("unpoisoned").is_empty());
@@ -269,7 +307,7 @@ mod tests {
     #[test]
     fn an_address_outside_the_buffer_cannot_be_made() {
         let (_, platform) = platform();
-        let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("in reach");
+        let buffer = CpuBuffer::allocate(&platform, 4, 40.into()).expect("in reach");
         let device = buffer.into_device(4, Access::Read).expect("handed over");
         let address = device.range(16, 48).expect("inside");
         assert_eq!((address.low(), address.high()), (16, 8));
@@ -280,9 +318,28 @@ mod tests {
     #[test]
     fn memory_out_of_the_cores_reach_is_refused_and_freed() {
         let (fake, platform) = platform();
-        let refused = CpuBuffer::allocate(&platform, 4, 32);
+        let refused = CpuBuffer::allocate(&platform, 4, 32.into());
         assert!(matches!(refused, Err(PlatformError::OutOfReach { address_width: 32, .. })));
         assert_eq!(fake.released.lock().expect("unpoisoned").len(), 1);
-        assert!(SharedWords::allocate(&platform, 16, 64).is_ok());
+        assert!(SharedWords::allocate(&platform, 16, 64.into()).is_ok());
+    }
+
+    #[test]
+    fn memory_outside_the_fence_is_refused_by_name_and_freed() {
+        let (fake, platform) = platform();
+        // The platform's memory begins at 0x8_0000_0000.
+        let reach =
+            |text: &str| Reach { address_width: 40, fence: Some(text.parse().expect("a fence")) };
+        let error = SharedWords::allocate(&platform, 16, reach("0x50000000+64M"));
+        let text = error.expect_err("outside").to_string();
+        for part in ["\"fake\"", "64 bytes at 0x800000000", "0x50000000+64M", "--memory"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert_eq!(fake.released.lock().expect("unpoisoned").len(), 1);
+        let inside = CpuBuffer::allocate(&platform, 4, reach("0x800000000+64K")).expect("inside");
+        // A buffer that begins inside and ends behind it.
+        let error = CpuBuffer::allocate(&platform, 4096, reach("0x800000000+64K"));
+        assert!(matches!(error, Err(PlatformError::OutsideFence { bytes: 0x1_0000, .. })));
+        drop(inside);
     }
 }

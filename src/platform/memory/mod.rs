@@ -6,6 +6,7 @@ use super::{Access, DmaMemory, PlatformError, SharedMemory};
 
 pub(crate) mod buffer;
 pub(crate) mod copy;
+pub(crate) mod guard;
 pub(crate) mod pool;
 pub(crate) mod reserved;
 pub(crate) mod sync_mode;
@@ -16,6 +17,12 @@ pub(crate) mod volatile;
 ///
 /// A piece is addressed by the bus address of its first byte, as `allocate` returned it.
 pub(crate) trait DmaMemorySource: fmt::Debug + Send + Sync {
+    /// The name by which its user knows it.
+    fn name(&self) -> &str;
+    /// Bus address and length of the whole, if it is one piece.
+    fn extent(&self) -> Option<(u64, u64)> {
+        None
+    }
     /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
     /// Coherent words that both sides may touch at any time.

@@ -17,6 +17,8 @@ const LINE: u64 = 64;
 
 /// Contiguous physical memory for DMA. Offsets count from its first byte.
 pub(crate) trait Region: fmt::Debug + Send + Sync {
+    /// The name of its device or file.
+    fn name(&self) -> &str;
     /// Bus address of the first byte.
     fn address(&self) -> u64;
     /// Length, bytes.
@@ -132,6 +134,14 @@ impl Pool {
 }
 
 impl DmaMemorySource for Pool {
+    fn name(&self) -> &str {
+        self.region.name()
+    }
+
+    fn extent(&self) -> Option<(u64, u64)> {
+        Some((self.region.address(), self.region.bytes()))
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         self.give(bytes, |at| self.region.memory(at, beats))

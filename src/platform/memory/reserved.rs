@@ -116,6 +116,10 @@ impl ReservedMemory {
 /// which Device memory allows. The pool gives each piece to one holder: no two threads meet at a
 /// beat here either.
 impl Region for ReservedMemory {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
     fn address(&self) -> u64 {
         self.address
     }

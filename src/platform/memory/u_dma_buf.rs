@@ -34,7 +34,7 @@ use super::volatile::MappedBeats;
 use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::linux::sysfs::{read_if_present, read_number};
-use crate::platform::linux::system::open_device;
+use crate::platform::linux::system::{open_device, require_bytes};
 use crate::platform::{Access, DmaMemory, PlatformError, SharedMemory, System};
 
 /// How the CPU sees the buffers of a u-dma-buf.
@@ -56,6 +56,7 @@ const LINE: usize = 64;
 /// An open u-dma-buf.
 #[derive(Debug)]
 pub(crate) struct UDmaBuf {
+    name: String,
     address: u64,
     bytes: u64,
     /// The mapping for buffers.
@@ -153,7 +154,7 @@ impl UDmaBuf {
             Caching::Cached if coherent => (cached()?, None),
             Caching::Cached => (cached()?, Some(Sync::open(&buffer)?)),
         };
-        Ok(Self { address, bytes, data, words, sync })
+        Ok(Self { name: name.to_owned(), address, bytes, data, words, sync })
     }
 }
 
@@ -194,7 +195,9 @@ pub fn u_dma_buf_names(system: &System) -> Vec<String> {
 /// another error if it cannot be used.
 pub fn try_u_dma_buf(system: &System, name: &str) -> Result<(), PlatformError> {
     let buffer = directory(system, name)?;
-    open_device(&system.dev.join(name), nix::libc::O_SYNC)?;
+    let path = system.dev.join(name);
+    let file = open_device(&path, nix::libc::O_SYNC)?;
+    require_bytes(&file, &path, read_number(&buffer.join("size"))?)?;
     if is_coherent(&buffer)? {
         return Ok(());
     }
@@ -202,6 +205,10 @@ pub fn try_u_dma_buf(system: &System, name: &str) -> Result<(), PlatformError> {
 }
 
 impl Region for UDmaBuf {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
     fn address(&self) -> u64 {
         self.address
     }

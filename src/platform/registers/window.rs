@@ -261,6 +261,10 @@ pub(crate) mod fake {
     }
 
     impl DmaMemorySource for FakePlatform {
+        fn name(&self) -> &str {
+            "fake"
+        }
+
         fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
             let memory = DmaMemory::Heap(vec![Default::default(); beats].into());
             Ok((self.address(beats * 16), memory))

@@ -90,6 +90,10 @@ impl Composed {
 }
 
 impl DmaMemorySource for Composed {
+    fn name(&self) -> &str {
+        "composed"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let (real, memory) = self.real.memory().allocate(beats)?;
         let (address, twin) = self.engines.allocate(beats)?;

@@ -8,6 +8,7 @@ mod planned;
 mod prepared;
 mod prepared_fault;
 mod tampered;
+mod unplugged;
 mod wait;
 mod written;
 

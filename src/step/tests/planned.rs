@@ -47,6 +47,9 @@ fn planned_faults_are_named_with_channel_and_phase() {
         ("corrupt=1@dma0.s2mm", "checksum", None, ""),
         ("accelerator-hang", "deadline", None, ""),
         ("no-done", "no-done", None, ""),
+        ("reloaded", "logic-reset", None, ""),
+        ("reloaded@dma2.mm2s,phase=contact2,beat=9", "logic-reset", None, ""),
+        ("reloaded@dma3.s2mm,beat=20", "logic-reset", None, ""),
         (
             "late-cmplted=900000000@dma2.s2mm",
             "descriptor-status-missing",

@@ -70,6 +70,10 @@ pub(crate) struct Wires {
     /// Every register write: region and offset. An allocation of memory, or its hand-over, counts
     /// as a write to [`MEMORY`].
     pub(crate) writes: Vec<(usize, u32)>,
+    /// Whether the kernel has taken the logic away.
+    pub(crate) unplugged: bool,
+    /// The number of the wait for an interrupt at whose end the kernel does so; 0 for no wait.
+    pub(crate) unplug_after: u32,
 }
 
 impl Wires {
@@ -186,6 +190,10 @@ impl RegisterWindow for Wired {
 }
 
 impl DmaMemorySource for Tampered {
+    fn name(&self) -> &str {
+        "tampered"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         self.wires().writes.push((MEMORY, 0));
         self.inner.allocate(beats)
@@ -247,6 +255,7 @@ impl Platform for Tampered {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        self.reach()?;
         let wait_limit = {
             let mut wires = self.wires();
             if wires.cancel_at == 1 {
@@ -277,6 +286,8 @@ impl Platform for Tampered {
             (false, false) => self.inner.wait_interrupt(timeout),
         };
         let mut wires = self.wires();
+        wires.unplugged |= wires.unplug_after == 1;
+        wires.unplug_after = wires.unplug_after.saturating_sub(1);
         if let Some(mut hook) = wires.after_wait.take() {
             hook(&Descriptors(&wires.shared));
             wires.after_wait = Some(hook);
@@ -285,7 +296,13 @@ impl Platform for Tampered {
     }
 
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        self.reach()?;
         self.wires().masked = false;
         self.inner.unmask_interrupt()
+    }
+
+    fn lost(&self) -> Option<PlatformError> {
+        let why = "the logic went away".to_owned();
+        self.wires().unplugged.then_some(PlatformError::Lost { why })
     }
 }

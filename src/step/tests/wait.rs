@@ -184,7 +184,21 @@ fn a_diagnosis_shows_the_registers_that_were_read_and_no_others() {
         let (board, mut accelerator) = open(config);
         board.inject(Injected::new(FaultKind::DmaDecErr).on(2, Side::Mm2s));
         let error = step(&mut accelerator, CUBES).0.expect_err("a fault");
-        let lines = error.diagnosis().expect("taken down").registers();
+        let diagnosis = error.diagnosis().expect("taken down");
+        let lines = diagnosis.registers();
+        // Rings lie on both sides of 4 GiB.
+        let above = diagnosis.channels.iter().filter(|state| state.tail >> 32 == 8);
+        assert_eq!(above.clone().count(), if wide { 4 } else { 0 });
+        for state in above {
+            let ring = state.tail & !0xFFFF;
+            assert_eq!((state.current & !0xFFFF, ring >> 32), (ring, 8));
+            for (name, address) in [("CURDESC", state.current), ("TAILDESC", state.tail)] {
+                for (half, value) in [("", address & 0xFFFF_FFFF), ("_MSB", address >> 32)] {
+                    let line = format!("{} {name}{half} = {value:#010x}", state.channel);
+                    assert!(lines.contains(&line), "{line}: {lines:#?}");
+                }
+            }
+        }
         let of = |name: &str| lines.iter().filter(|line| line.contains(name)).count();
         assert_eq!((of("DMACR"), of("DMASR"), of(" CURDESC = "), of(" TAILDESC = ")), (8, 8, 8, 8));
         let upper = if wide { 8 } else { 0 };

@@ -23,11 +23,13 @@ const char USAGE_TEXT[] =
     "  --cold            begin every step with impulses of 0 on the board; Bullet's own solver stays warm\n"
     "  --deep N          speed of points deeper than the threshold, per cent of that at it, 0 to 100 (36)\n"
     "  --ignore-properties\n"
-    "                    the board solves contacts without the properties that it lacks (rolling friction ...)\n"
+    "                    the board solves contacts without the properties that it lacks (rolling friction "
+    "...)\n"
     "  --json            the table as JSON\n"
     "  --list            the scenes\n"
     "\n"
-    "With one of the options from --iterations to --ignore-properties the limits are shown and do not count.\n"
+    "With one of the options from --iterations to --ignore-properties the limits are shown and do not "
+    "count.\n"
     "\n"
     "exit status: 0; 1 a limit does not hold; 2 wrong usage; 77 the board does not open, nothing was run\n";
 
@@ -69,9 +71,11 @@ const std::vector<Scene> &scenes() {
         {"ccd", "a fast ball against a thin wall", ccd, false},
         {"joints", "a chain, which stays Bullet's, beside boxes on the board", joints, false},
         {"drop", "ten boxes of 2 m and 1 kg fall 19 m, as a tower", drop, false},
+        {"deep", "a cube deep in the ground", deep, false},
         {"rolling", "a ball with rolling friction and a box on a ramp of 10 degrees", rolling, false},
         {"soft", "a box of 4 kg on contacts of stiffness 300 and damping 10", soft, false},
-        {"properties", "a ball on the ground, its contact with a property that no board has", properties, false},
+        {"properties", "a ball on the ground, its contact with a property that no board has", properties,
+         false},
         {"masses", "more masses than the table of the board", masses, false},
         {"warm", "1,000 jumbled cubes, a step with the last one's impulses and one without", warmth, false},
         {"spread", "pile and tower, the bodies shifted by at most 1 mm", spread, true},

@@ -87,5 +87,5 @@ void pile(Table &), wall(Table &), mixed(Table &), tower(Table &), ratio(Table &
 void ramp(Table &), groove(Table &), spin(Table &);
 void platform(Table &), restitution(Table &), mesh(Table &), sleeping(Table &), ccd(Table &);
 void joints(Table &), masses(Table &);
-void drop(Table &), rolling(Table &), soft(Table &), properties(Table &);
+void drop(Table &), deep(Table &), rolling(Table &), soft(Table &), properties(Table &);
 void warmth(Table &), timing(Table &);

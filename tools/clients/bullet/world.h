@@ -21,8 +21,7 @@ struct Settings {
         const ZynqPgsOptions own;
         return iterations == 0 && solver.pointsPerCollision == own.pointsPerCollision &&
                solver.reverseEvery == own.reverseEvery && solver.warmStart == own.warmStart &&
-               solver.ignoreProperties == own.ignoreProperties &&
-               solver.deepShare == own.deepShare;
+               solver.ignoreProperties == own.ignoreProperties && solver.deepShare == own.deepShare;
     }
 };
 

@@ -64,8 +64,8 @@ btScalar recovery(const btManifoldPoint &point, btScalar distance, const btConta
 
 // The speed at which a point may close, m/s, which travels as its distance. Below 0 the bodies must part.
 // - A gap closes within the step at most, so that a point ahead of the contact does nothing too early.
-// - Penetration goes by its share (ERP) in a step, as in Bullet. That of a deep point goes by the second step,
-//   and here it has `deepShare` of the speed that a point at the threshold has.
+// - Penetration goes by its share (ERP) in a step, as in Bullet. That of a deep point is the second step's, and
+//   the point has `deepShare` of the speed that one at the threshold has.
 // - A bounce takes the place of that push where it is faster. Bullet adds the two, and a ball then rises
 //   higher than its restitution says.
 float closingSpeed(const btManifoldPoint &point, const btCollisionObject *a, const btCollisionObject *b,

@@ -30,8 +30,8 @@ public:
     void take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds, int numManifolds);
     // Makes collisions and bodies of everything taken.
     void gather(const btContactSolverInfo &info);
-    // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision. Moves
-    // the bodies by their pushes, if preparePushes was called.
+    // Gives every body taken its velocity: the one in bodies(), or by its forces if it is in no collision.
+    // Moves the bodies by their pushes, if preparePushes was called.
     void write(const btContactSolverInfo &info);
     // Puts the collisions in reverse order.
     void reverse();
@@ -40,8 +40,8 @@ public:
     void loadImpulses(float factor, bool withFriction);
     // Stores impulses() in Bullet's points.
     void storeImpulses();
-    // Makes the distances of collisions() those of the second step: deep points push, others resist and may close
-    // a gap. The pushes, one for each of bodies(), are 0 before that step.
+    // Makes the distances of collisions() those of the second step: deep points push, others resist and may
+    // close a gap. The pushes, one for each of bodies(), are 0 before that step.
     std::vector<Push> &preparePushes(const btContactSolverInfo &info);
     // A property of a contact of the manifold that no board has, in words; null if there is none.
     static const char *property(const btPersistentManifold &manifold, const btContactSolverInfo &info);

@@ -43,8 +43,8 @@ btScalar ZynqPgsSolver::solveGroup(btCollisionObject **bodies, int numBodies,
                                    const btContactSolverInfo &info, btIDebugDraw *debugDrawer,
                                    btDispatcher *dispatcher) {
     m_dispatcher = dispatcher;
-    // A group may hold several islands. Those with a joint are Bullet's, and those with a contact that a board
-    // cannot solve as Bullet does.
+    // A group may hold several islands. Those with a joint are Bullet's, and those with a contact that has a
+    // property which no board has.
     std::set<int> bullets;
     for (int i = 0; i < numConstraints; i++)
         bullets.insert(islandOf(&constraints[i]->getRigidBodyA(), &constraints[i]->getRigidBodyB()));
@@ -172,8 +172,7 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     zpgs_report pushReport = {};
     pushReport.size = sizeof pushReport;
     const bool pushes = m_gather.isDeep();
-    if (pushes && status == ZPGS_STATUS_OK)
-        status = push(info, bodies, collisions, parameters, pushReport);
+    if (pushes && status == ZPGS_STATUS_OK) status = push(info, bodies, collisions, parameters, pushReport);
     m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
     if (failed(status)) return false;
     m_counts.boardSteps++;
@@ -229,8 +228,8 @@ zpgs_status ZynqPgsSolver::push(const btContactSolverInfo &info, zpgs_bodies bod
     bodies.angular_velocities = {pushes[0].angular, sizeof pushes[0]};
     collisions.impulses = {};
     // It takes as many passes as the first, all of contact.
-    parameters.contact_iterations = std::min(parameters.contact_iterations + parameters.friction_iterations,
-                                             MOST_PASSES);
+    parameters.contact_iterations =
+        std::min(parameters.contact_iterations + parameters.friction_iterations, MOST_PASSES);
     parameters.friction_iterations = 0;
     parameters.kinematic = 0;
     parameters.warm_start = 0;

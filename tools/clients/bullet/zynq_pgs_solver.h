@@ -5,8 +5,8 @@
 //
 // The solver gathers the islands of a step and solves them all in one step of the board. Forces, gyroscopic
 // terms, continuous detection, sleeping and the integration stay Bullet's. An island with a joint, or with a
-// contact that a board cannot solve as Bullet does, goes to Bullet's own solver, from which this class derives,
-// and so does a whole step that the board cannot take.
+// property of a contact that no board has, goes to Bullet's own solver, from which this class derives, and so
+// does a whole step that the board cannot take.
 #pragma once
 
 #include <btBulletDynamicsCommon.h>
@@ -39,9 +39,9 @@ struct ZynqPgsOptions {
     // The board solves islands, too, whose contacts have a property that no board has (rolling friction and
     // others, ZynqPgsGather::property), and leaves the property out.
     bool ignoreProperties = false;
-    // With m_splitImpulse a point deeper than the threshold has this share of the speed that a point at the
-    // threshold has, and the rest is a second step's, which moves the poses. 0 is Bullet's own rule, with which
-    // piles of few passes sink; 0.36 is as much as gravity gives in a step of 1/60 s.
+    // With m_splitImpulse a second step takes points deeper than the threshold out by the poses. In the first
+    // they have this share of the speed that a point at the threshold has. With 0, which is Bullet's rule, piles
+    // of few passes sink; 0.36 is as much as gravity gives in a step of 1/60 s.
     float deepShare = 0.36f;
     // Repetitions of a step that failed on the board, before Bullet's solver takes it.
     uint32_t retries = 1;

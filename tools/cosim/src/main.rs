@@ -98,8 +98,9 @@ impl BuildArgs {
         };
         let inertia = self.inertia.into();
         let subnormals = Subnormals::Flush;
-        let extensions = Parameters::with(inertia).extensions();
-        BoardConfig { hazards, inertia, subnormals, extensions, ..Default::default() }
+        let parameters = Parameters::with(inertia);
+        let (extensions, fence) = (parameters.extensions(), Some(parameters.memory));
+        BoardConfig { hazards, inertia, subnormals, extensions, fence, ..Default::default() }
     }
 }
 

@@ -13,20 +13,24 @@ const EXAMPLES: &str = "\
 Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
-  pgs solve vectors/one_cube --compare
-  pgs detect --input vectors/full_step186 --compare
+  pgs solve tests/golden/one_cube --compare
+  pgs detect --input tests/golden/pile5_step60 --compare
   pgs compare float half               how far two builds of the board diverge
-  pgs formats --input vectors/full_step186
+  pgs formats --input tests/golden/pile5_step60
   pgs model --collisions 127000 --bodies 38880
-  pgs order --input vectors/full_step186
+  pgs order --input tests/golden/pile5_step60
   pgs report --out report              the thesis' tables and figures again
-  pgs study determinism --input vectors/full_step186
+  pgs study determinism --input tests/golden/pile5_step60
   pgs study ladder                     the thesis' designs, and the factor that each brings
   pgs list --json
-  pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
-  pgs check                            test the board; with --board emulated the emulated one
+  pgs check --board emulated           test the emulated board as a real one
   pgs faults                           every fault at every place, and the driver's reaction
-  pgs serve --socket /tmp/board        and elsewhere: pgs --board socket:/tmp/board
+  pgs serve --socket /tmp/board        an emulated board for other processes
+  pgs --board socket:/tmp/board        one of them, in another terminal
+
+Examples on a board:
+  pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
+  pgs check
 
 RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 

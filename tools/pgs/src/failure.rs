@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::output::SCHEMA;
+use crate::output::width::{of_terminal, wrapped};
 
 /// The exit code of an interrupted command.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -147,8 +148,13 @@ impl Failure {
         if self.is_closed_pipe() {
             return ExitCode::SUCCESS;
         }
+        let chain = self.chain();
+        let chain = match of_terminal(io::stderr()) {
+            Some(columns) => broken(&chain, columns),
+            None => chain,
+        };
         // With stderr closed, the exit code still tells the failure.
-        let _ = writeln!(stderr, "{}", self.chain());
+        let _ = writeln!(stderr, "{chain}");
         let _ = write!(stderr, "{}", self.details);
         ExitCode::from(match self.cause {
             Cause::Input | Cause::Output => 2,
@@ -156,6 +162,21 @@ impl Failure {
             Cause::Hardware => 4,
         })
     }
+}
+
+/// Breaks lines between words, and indents what follows in a line of its own. A file or a pipe gets
+/// whole lines, which programs can search.
+fn broken(text: &str, columns: usize) -> String {
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        let begin = &line[..line.len() - line.trim_start().len()];
+        let mut indent = begin.len();
+        for part in wrapped(line, columns.saturating_sub(begin.len() + 4)) {
+            lines.push(format!("{:indent$}{part}", ""));
+            indent = begin.len() + 4;
+        }
+    }
+    lines.join("\n")
 }
 
 /// An error behind its context.
@@ -211,6 +232,15 @@ mod tests {
         let text = Failure::input("no").next("look").hint("see there").chain();
         assert_eq!(text, "error: no\n  next: look; see there");
         assert_eq!(Failure::input("no").hint("see there").chain(), "error: no\n  next: see there");
+    }
+
+    #[test]
+    fn on_a_terminal_a_chain_is_broken_between_words() {
+        let chain = Failure::input("one two three four").next("look here and there").chain();
+        assert_eq!(
+            broken(&chain, 20),
+            "error: one two\n    three four\n  next: look\n      here and there"
+        );
     }
 
     #[test]

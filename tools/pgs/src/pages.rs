@@ -123,9 +123,13 @@ fn roff(text: &str) -> String {
             roff.push_str(".fi\n");
             kept = false;
         }
-        if line == "Examples:" || line == "Example:" {
-            roff.push_str(".SH EXAMPLES\n");
-            in_examples = true;
+        if let Some(heading) = examples(line) {
+            if !std::mem::replace(&mut in_examples, true) {
+                roff.push_str(".SH EXAMPLES\n");
+            }
+            if !heading.is_empty() {
+                roff.push_str(&format!(".SS {}\n", escaped(heading)));
+            }
         } else if line.is_empty() {
             roff.push_str(if kept { "\n" } else { ".PP\n" });
         } else {
@@ -144,6 +148,11 @@ fn roff(text: &str) -> String {
         roff.push_str(".fi\n");
     }
     roff
+}
+
+/// The place that a heading of examples names: none where they run anywhere.
+fn examples(line: &str) -> Option<&str> {
+    line.strip_prefix("Examples")?.strip_suffix(':').map(str::trim)
 }
 
 /// A line that roff takes for text, with hyphens that can be copied to a shell.
@@ -168,7 +177,11 @@ mod tests {
         assert_eq!(pages.len(), verbs.len() + 1);
         for (name, page) in pages {
             let page = String::from_utf8(page).expect("text");
-            assert!(page.contains(".SH EXAMPLES\n.nf\n  pgs"), "{name}: {page}");
+            let (_, examples) = page.split_once(".SH EXAMPLES\n").expect(&name);
+            assert!(
+                examples.lines().take(3).any(|line| line.starts_with("  pgs")),
+                "{name}: {page}"
+            );
             let verb = format!("pgs\\-{VERB}");
             assert!(!page.contains(&verb), "{name} names a verb that no package has");
         }
@@ -179,6 +192,10 @@ mod tests {
         assert_eq!(
             roff("Examples:\n  pgs -a\n  pgs b\n\n.text\nmore"),
             ".SH EXAMPLES\n.nf\n  pgs \\-a\n  pgs b\n\n.fi\n.SH NOTES\n\\&.text\nmore\n"
+        );
+        assert_eq!(
+            roff("Examples:\n  pgs a\n\nExamples on a board:\n  pgs b\n"),
+            ".SH EXAMPLES\n.nf\n  pgs a\n\n.fi\n.SS on a board\n.nf\n  pgs b\n.fi\n"
         );
     }
 

@@ -26,7 +26,7 @@ pub(crate) fn open(
     build: &Build,
 ) -> Result<(Scene, OpenBoard), Failure> {
     scenes::check_rows(grid)?;
-    let mut opened = board::open(common, build)?;
+    let mut opened = board::open(common, build)?.stated();
     scenes::check_size(grid, opened.accelerator.capabilities())?;
     let scene = self::build(grid, drop)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;

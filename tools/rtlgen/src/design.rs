@@ -1,6 +1,7 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
 use pgs_interface::extension::Extensions;
+use pgs_interface::fence::Fence;
 use pgs_interface::profile::{Depth, FLOAT, Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -31,6 +32,9 @@ pub struct Parameters {
     /// Whether impulses come in (warm start) and go out: FEATURES bit 8. Without it, bits 3 and 4 of FLAGS
     /// have no effect.
     pub warm_start: WarmStart,
+    /// The one address segment of every DMA master in the block design, which FENCE_BASE and FENCE_SIZE
+    /// report.
+    pub memory: Fence,
     /// Clock that `CLOCK_KHZ` reports, kHz.
     pub clock_khz: u32,
 }
@@ -58,6 +62,7 @@ impl Parameters {
             output_stages: 3,
             smallest_normal: true,
             warm_start: WarmStart::Built,
+            memory: Fence::default(),
             clock_khz: FLOAT.clock_khz,
         }
     }

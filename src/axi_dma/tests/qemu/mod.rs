@@ -6,8 +6,8 @@
 //!
 //! It does less than PG021 says, so that these tests cannot judge: byte counts (a descriptor's stay
 //! 0), RXSOF and RXEOF of a packet in several descriptors (all have both), `SGIncld` (reads 0), a
-//! stop (`Halted` stays 0 when RS is cleared), a direction held up by the other, addresses above 32
-//! bits.
+//! stop (`Halted` stays 0 when RS is cleared), CURDESC after a reset (it stays), a direction held up
+//! by the other, addresses above 32 bits.
 
 mod machine;
 mod platform;
@@ -65,13 +65,14 @@ impl Core {
     }
 
     fn ring(&self, direction: Direction, chain: usize) -> Ring {
-        Ring::new(&self.platform, direction, chain, ADDRESS_WIDTH).expect("enough memory")
+        Ring::new(&self.platform, direction, chain, ADDRESS_WIDTH.into()).expect("enough memory")
     }
 
     /// A buffer that holds these bytes, with the device.
     fn outgoing(&self, bytes: &[u8]) -> DeviceBuffer {
         let beats = bytes.len().div_ceil(16);
-        let mut buffer = CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH).expect("memory");
+        let mut buffer =
+            CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH.into()).expect("memory");
         let mut padded = bytes.to_vec();
         padded.resize(16 * beats, 0);
         let (words, _) = padded.split_arrays::<4>();
@@ -85,7 +86,8 @@ impl Core {
     /// An empty buffer, with the device.
     fn incoming(&self, bytes: usize) -> DeviceBuffer {
         let beats = bytes.div_ceil(16);
-        let buffer = CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH).expect("memory");
+        let buffer =
+            CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH.into()).expect("memory");
         buffer.into_device(beats, Access::Write).expect("handed over")
     }
 
@@ -164,9 +166,12 @@ const WHOLE: u32 = status::CMPLTED.mask() | status::RXSOF.mask() | status::RXEOF
 /// The STATUS words of the first descriptors of a ring's chain, as they lie in the machine's
 /// memory.
 fn statuses<const N: usize>(core: &Core, ring: &Ring) -> [u32; N] {
-    let first = u64::from(ring.start().expect("inside").low());
-    std::array::from_fn(|index| {
-        core.qemu.word(first + (index * descriptor::BYTES + 4 * descriptor::STATUS) as u64)
+    let mut at = ring.start().expect("inside").raw();
+    std::array::from_fn(|_| {
+        let word = |index: usize| core.qemu.word(at + 4 * index as u64);
+        let status = word(descriptor::STATUS);
+        at = word(descriptor::NXTDESC).into();
+        status
     })
 }
 
@@ -186,6 +191,22 @@ fn a_reset_halts_both_directions_and_a_start_makes_one_run() {
         core.start(Direction::S2mm, &ring);
         assert!(!core.s2mm.status().halted());
         core.reset();
+    }
+}
+
+#[test]
+fn a_running_channel_shows_its_first_descriptor_before_the_doorbell_that_fetches_it() {
+    let Some(mut core) = Core::new() else { return };
+    for direction in [Direction::Mm2s, Direction::S2mm] {
+        for _ in 0..2 {
+            let ring = core.ring(direction, 3);
+            let first = ring.start().expect("inside").raw();
+            core.start(direction, &ring);
+            let channel = core.channel(direction);
+            assert!(!channel.status().halted(), "{direction}");
+            assert_eq!(channel.current_descriptor(), first, "{direction}");
+            core.reset();
+        }
     }
 }
 
@@ -260,8 +281,8 @@ fn a_packet_that_ends_before_its_chain_is_seen_and_a_reset_gets_the_buffer_back(
     core.reset();
     assert_eq!(received(buffer)[..short.len()], short);
 
-    // The ring begins anew. One of its descriptors was complete.
-    ring.rewind();
+    // The next chain begins with the spare descriptor, and goes on with the one that was complete.
+    ring.begin();
     let buffer = core.incoming(3 * 128);
     push_places(&mut ring, &buffer, 128, 3);
     core.start(Direction::S2mm, &ring);

@@ -191,6 +191,10 @@ impl RegisterWindow for DmaWindow {
 }
 
 impl DmaMemorySource for QtestPlatform {
+    fn name(&self) -> &str {
+        "qtestplatform"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let address = self.board().allocate((beats * BEAT_BYTES) as u64);
         Ok((address, DmaMemory::Heap(vec![Beat::default(); beats].into())))

@@ -58,7 +58,7 @@ fn mistake_03_address_cut_to_32_bits() {
     // Memory that the cores do not reach is refused, not cut.
     let planted = Planted::new(BoardConfig::default(), None, None);
     let platform: Arc<dyn Platform> = Arc::new(planted);
-    let beyond = (0..4).filter(|_| CpuBuffer::allocate(&platform, 4, 32).is_err()).count();
+    let beyond = (0..4).filter(|_| CpuBuffer::allocate(&platform, 4, 32.into()).is_err()).count();
     assert!(beyond > 0, "some of the memory lies above 4 GiB");
 }
 
@@ -129,7 +129,7 @@ fn mistake_15_length_spills_into_the_packet_marks() {
 fn some_address() -> BusAddress {
     let planted = Planted::new(BoardConfig::default(), None, None);
     let platform: Arc<dyn Platform> = Arc::new(planted);
-    let buffer = CpuBuffer::allocate(&platform, 4, 40).expect("there is room");
+    let buffer = CpuBuffer::allocate(&platform, 4, 40.into()).expect("there is room");
     let buffer = buffer.into_device(4, Access::Read).expect("handed over");
     buffer.range(0, 64).expect("inside")
 }

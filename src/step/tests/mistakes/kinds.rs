@@ -18,6 +18,8 @@ pub(crate) enum Mistake {
     HaltNotAwaited,
     /// Resets through MM2S, and assumes that S2MM goes on as before.
     OneDirectionReset,
+    /// Does not read back what it has written, neither CURDESC nor GIE.
+    StartBelieved,
     /// Has no deadlines: no time passes for it.
     NoDeadline,
     /// Ignores these bits of DMASR.

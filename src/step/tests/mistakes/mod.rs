@@ -11,7 +11,7 @@
 //! | 2 | upper half of the tail first | [`addresses`]`::mistake_02_upper_half_written_first` | the board: the engine runs past the tail |
 //! | 3 | address cut to 32 bits | [`addresses`]`::mistake_03_address_cut_to_32_bits` | the board: an access outside every buffer |
 //! | 4 | CURDESC written while running | [`addresses`]`::mistake_04_current_descriptor_written_while_running` | the board |
-//! | 5 | one direction reset | [`waits`]`::mistake_05_reset_of_one_direction` | the board: a doorbell of a halted channel |
+//! | 5 | one direction reset | [`waits`]`::mistake_05_reset_of_one_direction` | the driver: CURDESC does not read back |
 //! | 6 | unbounded wait | [`waits`]`::mistake_06_unbounded_wait` | the board's clock, for each wait of a step |
 //! | 7 | only completion awaited | [`waits`]`::mistake_07_only_completion_awaited` | the time until the error is reported |
 //! | 8 | decode error missing from the mask | [`waits`]`::mistake_08_error_bit_missing_from_the_mask` | an error of either register taken as success, bit by bit |
@@ -26,6 +26,7 @@
 //! | 17 | buffer used again after a time-out | [`buffers`]`::mistake_17_buffer_used_again_after_a_time_out` | the board: an access to a buffer of the CPU |
 //! | 18 | idle senders taken for the end | [`waits`]`::mistake_18_idle_senders_taken_for_the_end` | buffers taken back while engines run |
 //! | 19 | slices of a buffer that the device writes | [`buffers`]`::mistake_19_slices_of_a_buffer_that_the_device_writes` | the compiler, and the ports |
+//! | 20 | start believed without a look | [`sweep`]`::mistake_20_start_believed_without_a_look` | the board: a descriptor fetched outside every buffer |
 //!
 //! In addition [`confinement`] plants lengths and addresses that are off by one beat, freed buffers
 //! and buffers of the CPU.
@@ -37,6 +38,7 @@ mod confinement;
 mod kinds;
 mod planted;
 mod region;
+mod sweep;
 mod waits;
 
 use std::sync::Arc;

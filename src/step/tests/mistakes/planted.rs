@@ -300,6 +300,10 @@ impl Planted {
 }
 
 impl DmaMemorySource for Planted {
+    fn name(&self) -> &str {
+        "planted"
+    }
+
     fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
         let (address, memory) = self.inner.allocate(beats)?;
         let bytes = (memory.beats().len() * BEAT_BYTES) as u64;

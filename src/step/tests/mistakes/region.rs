@@ -4,7 +4,7 @@ use bitstream_model::Direction;
 use pgs_interface::axi_dma::{
     CURDESC, CURDESC_MSB, DMACR, DMASR, LENGTH, S2MM_OFFSET, TAILDESC, TAILDESC_MSB, dmacr, dmasr,
 };
-use pgs_interface::control::{self, AP_CTRL, ap_ctrl, reset};
+use pgs_interface::control::{self, AP_CTRL, CYCLES_LO, GIE, ap_ctrl, reset};
 
 use super::kinds::{ChannelId, Event, Mistake, Trouble};
 use super::planted::{Planted, State};
@@ -34,6 +34,14 @@ impl PlantedRegion {
         Self { planted: planted.clone(), inner, region }
     }
 
+    /// Whether the driver reads this register to learn whether it still has what was written.
+    fn believed(region: usize, at: u32) -> bool {
+        match region {
+            CONTROL_BLOCK => at == GIE.offset,
+            _ => [CURDESC.offset, CURDESC_MSB.offset].contains(&channel(region, at).2),
+        }
+    }
+
     fn read_control(state: &State, at: u32, mut value: u32) -> u32 {
         if at == control::DMA.offset && state.mistake == Some(Mistake::LengthWidthAssumed) {
             value = control::dma::LENGTH_WIDTH.put(value, ASSUMED_WIDTH);
@@ -46,6 +54,10 @@ impl PlantedRegion {
                 value &= !ap_ctrl::DONE.mask();
             }
         }
+        if at == CYCLES_LO.offset && state.forged {
+            // A driver that believes in the end of the step believes in its counters.
+            value = value.max(1);
+        }
         let stays = state.trouble == Some(Trouble::AcceleratorInReset) && state.opened;
         if at == control::RESET.offset && stays {
             value |= reset::RESET.mask();
@@ -56,6 +68,7 @@ impl PlantedRegion {
     fn read_dma(state: &State, region: usize, at: u32, mut value: u32) -> u32 {
         let (channel, key, offset) = channel(region, at);
         if offset == DMASR.offset {
+            let failed = value & dmasr::ERRORS != 0;
             match state.trouble {
                 Some(Trouble::Status(troubled, bits)) if troubled == channel && state.opened => {
                     value |= bits;
@@ -67,6 +80,10 @@ impl PlantedRegion {
             }
             if let Some(Mistake::StatusUnseen(bits)) = state.mistake {
                 value &= !bits;
+                if failed {
+                    // An error halts the channel, and such a driver does not see that either.
+                    value &= !dmasr::HALTED.mask();
+                }
             }
             if let Some(halted) = state.believed.get(&key) {
                 value = dmasr::HALTED.put(value, u32::from(*halted));
@@ -172,7 +189,11 @@ impl RegisterWindow for PlantedRegion {
             Planted::forge(&mut state);
         }
         let value = self.inner.read32(at);
-        let value = if self.region == CONTROL_BLOCK {
+        let believed =
+            Self::believed(self.region, at) && state.mistake == Some(Mistake::StartBelieved);
+        let value = if let Some(written) = state.last.get(&key).filter(|_| believed) {
+            *written
+        } else if self.region == CONTROL_BLOCK {
             Self::read_control(&state, at, value)
         } else {
             Self::read_dma(&state, self.region, at, value)

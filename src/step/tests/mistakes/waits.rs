@@ -27,7 +27,7 @@ const LONG: Duration = Duration::from_millis(30);
 fn mistake_05_reset_of_one_direction() {
     assert_reported(
         Mistake::OneDirectionReset,
-        "TAILDESC or LENGTH written while halted",
+        "dma0 S2MM has its first descriptor at 0x0",
         |mistake| {
             let mut bench = Bench::open(BoardConfig::default(), mistake, None)?;
             bench.step(20)?;

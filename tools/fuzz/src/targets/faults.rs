@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use bitstream_model::{
     BoardConfig, Consequence, CpuPort, EmulatedBoard, Fault, FaultKind, FaultPlan, ViolationKind,
+    When,
 };
 use zynq_pgs::{Accelerator, BoardChoice, Body, Error, OpenOptions, StepParameters};
 
@@ -21,7 +22,7 @@ const RECOVERY: Duration = Duration::from_millis(150);
 const STEPS: u32 = 3;
 
 /// Fragments of a line with a plan, in the right and in the wrong place.
-const PIECES: [&str; 24] = [
+const PIECES: [&str; 25] = [
     "dma-dec-err",
     "stall",
     "corrupt=0xFF",
@@ -29,6 +30,7 @@ const PIECES: [&str; 24] = [
     "slow",
     "reset-never",
     "power-lost",
+    "reloaded",
     "accelerator-error=3",
     "@",
     "dma1.s2mm",
@@ -123,6 +125,12 @@ fn plan(input: &mut Input<'_>, config: &BoardConfig) -> FaultPlan {
         if input.one_in(8) {
             fault.times = 1 + input.below(3);
         }
+        if let Some(When::Access(access)) = &mut fault.when
+            && input.one_in(2)
+        {
+            // Far enough for a reset, and for the start of every channel after it.
+            *access = input.below(600).into();
+        }
         if let FaultKind::Corrupt { mask } = &mut fault.kind {
             // At least one bit.
             *mask = input.word() | 1 << input.below(32);
@@ -186,6 +194,12 @@ impl Run {
             return None;
         }
         let expected = outcome(&bodies, &accelerator);
+        if input.one_in(4) {
+            // The next step starts every channel.
+            drop(accelerator);
+            accelerator = open(&port).expect("nothing is wrong with the board");
+            accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
+        }
         let (board, tally) = (board.clone(), Tally { steps: 1, ..Tally::default() });
         Some(Self { board, port, accelerator, scene, parameters, expected, tally })
     }

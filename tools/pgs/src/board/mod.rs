@@ -3,6 +3,7 @@
 mod accelerator;
 
 use std::io::{self, Write};
+use std::sync::Once;
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
@@ -41,6 +42,8 @@ pub(crate) struct OpenBoard {
     injected: Option<Injected>,
     /// Why this board was chosen.
     pub(crate) reason: String,
+    /// It is emulated, because there is no real one.
+    stands_in: bool,
 }
 
 /// The name of a kind of board, on the command line and in results.
@@ -117,9 +120,6 @@ pub(crate) fn find(
     let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
     let (kind, reason) = choose(name, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
-        if *name == BoardName::Auto {
-            log::warn!("{reason}: using the emulated board");
-        }
         // `PGS_MEMORY` describes real boards; it does not matter to an emulated board asked for by
         // name.
         let ignored = *memory_of_environment && *name == BoardName::Emulated;
@@ -198,7 +198,8 @@ pub(crate) fn open_as(
     let ChosenBoard { options, observer, reason, .. } = find(common, config, board_option(build))?;
     let accelerator = Accelerator::open(options)
         .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
-    Ok(OpenBoard { accelerator, observer, injected: None, reason })
+    let stands_in = common.board == BoardName::Auto && observer.is_some();
+    Ok(OpenBoard { accelerator, observer, injected: None, reason, stands_in })
 }
 
 /// The failure for a board that is missing or cannot be opened.
@@ -216,6 +217,19 @@ pub(crate) fn is_cancelled(error: &zynq_pgs::Error) -> bool {
 }
 
 impl OpenBoard {
+    /// Says once on stderr that the emulated board stands in for a real one; for results that do not name
+    /// their board.
+    pub(crate) fn stated(self) -> Self {
+        static STATED: Once = Once::new();
+        if self.stands_in {
+            STATED.call_once(|| {
+                // With stderr closed, the results still come.
+                let _ = writeln!(io::stderr(), "board: {} ({})", self.kind(), self.reason);
+            });
+        }
+        self
+    }
+
     /// Makes a failure of an error of the driver.
     pub(crate) fn failure(&self, error: zynq_pgs::Error) -> Failure {
         if let zynq_pgs::Error::Input(input) = &error {
@@ -238,10 +252,17 @@ impl OpenBoard {
                  take a shorter time step (solve: params.npy)",
             );
         }
-        let next = if error.may_retry() {
-            "run the command again"
-        } else {
-            "run the command again; load the bitstream anew if that does not help"
+        let late = matches!(error.fault(), Some(Fault::Deadline { .. }));
+        let next = match (late, self.observer.is_some() && self.injected.is_none()) {
+            // The emulated board takes the same time again.
+            (true, true) => {
+                "the same deadline ends this step again: give a longer --deadline, or none"
+            }
+            (true, false) if error.may_retry() => {
+                "run the command again, with a longer --deadline if this one ends the step again"
+            }
+            _ if error.may_retry() => "run the command again",
+            _ => "run the command again; load the bitstream anew if that does not help",
         };
         let violations = self.observer.as_ref().map(EmulatedBoard::violations).unwrap_or_default();
         let seen: String = violations.iter().map(|violation| format!("\n{violation}")).collect();

@@ -27,11 +27,12 @@ const TURN: &str = "convert the .bit of the same design by bootgen (device-tree/
 const UNPACK: &str = "unpack {}, and load the .bit.bin in it, or convert its .bit";
 const BOOT_IMAGE: &str = "a boot image is started by the board: copy it to the boot medium; to \
                           load its bitstream from Linux convert the .bit by bootgen with \
-                          -process_bitstream bin. An encrypted or authenticated bitstream is loaded by \
-                          fpgautil -f, which passes the key's kind on, or as it is with --unjudged";
+                          -process_bitstream bin. An encrypted or authenticated bitstream is \
+                          loaded by fpgautil -f, which passes the key's kind on, or as it is with \
+                          --unjudged";
 const OVERLAY: &str = "give the bitstream (.bit.bin) first, and this file by --overlay";
-const FETCH: &str =
-    "fetch the file itself: by `git lfs pull`, or once more from where it came from";
+const FETCH: &str = "fetch the file itself, by `git lfs pull` or once more from where it came \
+                     from; or make it as device-tree/README.md shows";
 pub(super) const README: &str = "see device-tree/README.md for how the files are made";
 
 /// Formats that are mistaken for bitstreams: offset and bytes of the signature, name, next step.
@@ -53,11 +54,6 @@ const SIGNATURES: &[(usize, &[u8], &str, &str)] = &[
     (257, b"ustar", "a tar archive", UNPACK),
     (0, b"!<arch>\n", "a package", UNPACK),
     (0, b"\x27\x05\x19\x56", "a U-Boot image", UNPACK),
-    (0, b"version https://git-lfs", "a git-lfs pointer", FETCH),
-    (0, b"<!DOCTYPE", "a web page", FETCH),
-    (0, b"<!doctype", "a web page", FETCH),
-    (0, b"<html", "a web page", FETCH),
-    (0, b"<HTML", "a web page", FETCH),
 ];
 
 /// A file's format by its first KiB.
@@ -89,7 +85,7 @@ pub(super) fn format(bytes: &[u8]) -> Format {
             Format::Bitstream(at + SYNC.len())
         }
         (_, Some(_)) => Format::Other(UNTURNED, TURN),
-        _ if is_text(head) => Format::Other("a text", README),
+        _ if is_text(head) => Format::Other("a text", FETCH),
         _ => Format::Unknown,
     }
 }
@@ -144,7 +140,7 @@ pub(super) fn judge(request: &Request, bytes: &[u8]) -> Result<Bitstream, LoadEr
     let cut = match end {
         End::Cut { inside: Some(words) } => Some(format!("inside a packet of {words} words")),
         End::Cut { inside: None } => Some("without the command DESYNC".to_owned()),
-        End::Desync | End::Empty if bytes.len() % 4 != 0 => {
+        End::Desync | End::Empty if !bytes.len().is_multiple_of(4) => {
             Some("which is no multiple of 4".to_owned())
         }
         _ => None,
@@ -229,8 +225,8 @@ mod tests {
             (b"xclbin2\0".to_vec(), "an xclbin container"),
             (b"\x7fELF\x02".to_vec(), "a program"),
             (tree::MAGIC.to_vec(), "a compiled device tree"),
-            (b"version https://git-lfs.github.com/spec/v1\noid".to_vec(), "a git-lfs pointer"),
-            (b"<!DOCTYPE html><html>".to_vec(), "a web page"),
+            (b"version https://git-lfs.github.com/spec/v1\noid".to_vec(), "a text"),
+            (b"<!DOCTYPE html><html>".to_vec(), "a text"),
             (b"all: { a.bit }\n".to_vec(), "a text"),
             ("Gr\u{fc}\u{df}e".as_bytes()[..6].to_vec(), "a text"),
             (Vec::new(), "an empty file"),

@@ -35,7 +35,8 @@ pub(crate) enum LoadError {
     Unjudged { path: PathBuf, reason: String },
     /// Loaded all the same, but is no good answer to a check.
     #[error(
-        "{}: the bitstream cannot be judged: nothing but zeros follows its sync word", path.display()
+        "{}: the bitstream cannot be judged: nothing but zeros follows its sync word",
+        path.display()
     )]
     Empty { path: PathBuf },
     #[error("{}: expected a compiled overlay (.dtbo), found {found}", path.display())]
@@ -108,7 +109,8 @@ pub(crate) enum LoadError {
     #[error("interrupted: {}", match stage {
         Stage::Untouched => "the kernel was given no bitstream, and the logic is as it was",
         Stage::Programming => {
-            "the kernel was loading the bitstream: the logic may be empty, half programmed, or running"
+            "the kernel was loading the bitstream: the logic may be empty, half programmed, or \
+             running"
         }
         Stage::Programmed => "the bitstream is loaded; an overlay may be applied or not",
     })]
@@ -165,14 +167,15 @@ impl LoadError {
         match self {
             Self::Unreadable { path, source } => unreadable(path, source),
             Self::Bitstream { next, .. } => next.clone(),
-            Self::OtherChip { .. } => "build the design for this chip; or name the board's chip with \
-                                       --part, if it is another"
+            Self::OtherChip { .. } => "build the design for this chip; or name the board's chip \
+                                       with --part, if it is another"
                 .to_owned(),
             Self::CutOff { .. } => "copy the file again, and compare its length with the \
                                     original's; or load it as it is with --unjudged"
                 .to_owned(),
             Self::Unjudged { reason, .. } if reason.contains("encrypted") => {
-                "load it by fpgautil -f, which passes the key's kind on; or as it is with --unjudged"
+                "load it by fpgautil -f, which passes the key's kind on; or as it is with \
+                 --unjudged"
                     .to_owned()
             }
             Self::Unjudged { .. } | Self::Empty { .. } => {
@@ -181,8 +184,8 @@ impl LoadError {
                     .to_owned()
             }
             Self::OwnFirmware { firmware, .. } => format!(
-                "give an overlay without a firmware-name, as zynq-pgs.dtbo; or let this one load the \
-                 bitstream, from /lib/firmware/{firmware}: fpgautil -b FILE -o OVERLAY"
+                "give an overlay without a firmware-name, as zynq-pgs.dtbo; or let this one load \
+                 the bitstream, from /lib/firmware/{firmware}: fpgautil -b FILE -o OVERLAY"
             ),
             Self::OtherClock { wanted, .. } => format!(
                 "give the overlay of this bitstream: assigned-clock-rates = <{wanted}000000> in \

@@ -3,12 +3,13 @@
 //!
 //! ```text
 //! both files -> FPGA manager -> users, locks -> other overlays and drivers -> ours
-//!            -> firmware file -> users -> fpga_manager -> state? -> overlay -> status? -> UIO node?
+//!            -> firmware file -> users -> fpga_manager -> state?
+//!            -> overlay -> status? -> UIO node?
 //! ```
 //!
 //! The locks of the device files are held until the end: a driver of this project that is started
-//! meanwhile is refused. Another program that opens a node between the second look for users and the
-//! write to the manager goes unnoticed.
+//! meanwhile is refused. Another program that opens a node between the second look for users and
+//! the write to the manager goes unnoticed.
 //!
 //! Source: linux-xlnx, `drivers/fpga/fpga-mgr.c` (attributes `flags`, `firmware`, `state`) and
 //! `drivers/of/configfs.c` (`overlays/<name>/{dtbo,status}`); mainline has neither.
@@ -32,7 +33,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use bitstream_model::interface::address_map::{
-    CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_MEMORY_NODE, UIO_NODE,
+    CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_GUARD_NODE, UIO_MEMORY_NODE, UIO_NODE,
 };
 use bitstream_model::interface::usr_access;
 use zynq_pgs::platform::{UioListing, uio_listing};
@@ -226,16 +227,17 @@ fn nodes(system: &dyn System) -> Result<UioListing, LoadError> {
     Ok(uio_listing(&system.path("sys/class/uio"))?)
 }
 
-/// Whether a node is the accelerator or its memory, by its name.
+/// Whether a node is the accelerator, its memory or the guard, by its name.
 fn is_ours(node: &UioNode) -> bool {
-    is_ours_by_name(&node.name) || node.name == UIO_MEMORY_NODE
+    is_ours_by_name(&node.name) || [UIO_MEMORY_NODE, UIO_GUARD_NODE].contains(&node.name.as_str())
 }
 
-/// Whether a node with this name has registers of the accelerator. The memory does not count: its
-/// node is in the base tree.
+/// Whether a node with this name has registers of the accelerator. Memory and guard do not count:
+/// their nodes are in the base tree.
 fn is_ours_by_name(name: &str) -> bool {
     let rest = name.strip_prefix(UIO_NODE);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-')) && name != UIO_MEMORY_NODE
+    let registers = ![UIO_MEMORY_NODE, UIO_GUARD_NODE].contains(&name);
+    registers && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
 
 /// Whether an address is one of the accelerator's registers.

@@ -11,8 +11,8 @@ use super::system::{System, read};
 
 /// Devices of the kernel, named by address.
 const DEVICES: &str = "sys/bus/platform/devices";
-/// First letters of drivers whose devices in the logic have no address: XRT's, and drivers that hand
-/// DMA channels to programs.
+/// First letters of drivers whose devices in the logic have no address: XRT's, and drivers that
+/// hand DMA channels to programs.
 const WITHOUT_ADDRESS: [&str; 4] = ["zocl", "dma_proxy", "dma-proxy", "axidma"];
 /// Drivers that hand a device to programs; `users` checks these.
 const UIO_DRIVERS: [&str; 2] = ["uio_pdrv_genirq", "uio_dmem_genirq"];

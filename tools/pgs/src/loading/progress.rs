@@ -69,3 +69,30 @@ impl Progress {
         exit(LoadError::Interrupted { stage: state.stage });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_removes_the_copy_and_tells_each_state_of_the_logic_apart() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let copy = folder.path().join("copy");
+        let mut told = Vec::new();
+        for stage in [Stage::Untouched, Stage::Programming, Stage::Programmed] {
+            let progress = Progress::default();
+            progress.reach(stage);
+            progress.keep(&copy);
+            fs::write(&copy, "a bitstream").expect("written");
+            progress.clone().end(|error| told.push((error.to_string(), error.next())));
+            assert!(!copy.exists(), "{stage:?}");
+        }
+        for (place, (text, next)) in told.iter().enumerate() {
+            assert!(text.starts_with("interrupted: "), "{text}");
+            assert!(told[..place].iter().all(|(t, n)| t != text && n != next), "{told:?}");
+        }
+        assert!(told[0].0.contains("the logic is as it was"), "{told:?}");
+        assert!(told[1].0.contains("half programmed"), "{told:?}");
+        assert!(told[2].0.contains("the bitstream is loaded"), "{told:?}");
+    }
+}

@@ -1,6 +1,7 @@
 //! Judges a compiled overlay by its content, before the kernel gets it.
 //!
-//! Source: Devicetree Specification 0.4, chapter 5; Linux, `Documentation/devicetree/overlay-notes`.
+//! Source: Devicetree Specification 0.4, chapter 5; Linux,
+//! `Documentation/devicetree/overlay-notes.rst`.
 
 use std::path::Path;
 

@@ -1,5 +1,6 @@
 //! The options that describe an emulated board. The library knows their values and their texts.
 
+use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
 use bitstream_model::interface::profile::{Inertia, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
@@ -53,6 +54,10 @@ pub(crate) struct BuildArgs {
         value_parser = number("address-width", |build| build.address_width)
     )]
     address_width: Option<u32>,
+    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K, at a
+    /// multiple of it [default: no fence]
+    #[arg(long, value_name = "BASE+BYTES", value_parser = number("fence", |build| build.fence))]
+    fence: Option<Fence>,
     /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
     /// for packing and unpacking a step; no result depends on their number [default: one per
     /// processor, at most 4]
@@ -77,6 +82,7 @@ impl BuildArgs {
             bandwidth: self.bandwidth,
             length_width: self.length_width,
             address_width: self.address_width,
+            fence: self.fence,
             threads: self.threads,
             lanes: self.lanes,
         }
@@ -157,7 +163,7 @@ mod tests {
     #[test]
     fn each_option_of_the_command_line_is_that_of_a_text() {
         let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
-                    length-width=14,address-width=32,threads=3,lanes=off";
+                    length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
         let expected: Build = text.parse().expect("a build");
         let options = Build::keys()
             .map(|key| format!("--{key}={}", expected.value(key).expect("given in the text")));

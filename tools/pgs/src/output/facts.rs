@@ -1,44 +1,42 @@
-//! Writes labelled facts in lines of at most 100 columns.
+//! Writes labelled facts in lines of the terminal's width.
 
 use std::io::{self, Write};
 
-/// Columns of a line.
-pub(crate) const WIDTH: usize = 100;
+use super::width::{stdout_width, wrapped};
+
 /// Columns of a label.
 const LABEL: usize = 11;
 
-/// Writes a fact behind its label, in as many lines as it needs. Lines end between words; a word
-/// longer than a line stays whole.
+/// Writes a fact behind its label, in as many lines as it needs.
 pub(crate) fn fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
-    let mut line = format!("{label:<LABEL$}");
-    let mut columns = LABEL;
-    let mut is_first = true;
-    for word in text.split_whitespace() {
-        let length = word.chars().count();
-        if !is_first && columns + 1 + length > WIDTH {
-            writeln!(out, "{line}")?;
-            line = " ".repeat(LABEL);
-            columns = LABEL;
-            is_first = true;
-        }
-        if !is_first {
-            line.push(' ');
-            columns += 1;
-        }
-        line.push_str(word);
-        columns += length;
-        is_first = false;
+    labelled(out, label, LABEL, text, stdout_width())
+}
+
+/// Writes a text behind a label of `indent` columns, in lines of at most `columns`. Lines end between
+/// words; a word longer than a line stays whole.
+pub(crate) fn labelled(
+    out: &mut dyn Write,
+    label: &str,
+    indent: usize,
+    text: &str,
+    columns: usize,
+) -> io::Result<()> {
+    let mut label = label;
+    for line in wrapped(text, columns.saturating_sub(indent)) {
+        writeln!(out, "{}", format!("{label:<indent$}{line}").trim_end())?;
+        label = "";
     }
-    writeln!(out, "{}", line.trim_end())
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::width::MOST;
     use super::*;
 
     fn written(label: &str, text: &str) -> String {
         let mut out = Vec::new();
-        fact(&mut out, label, text).expect("written");
+        labelled(&mut out, label, LABEL, text, MOST).expect("written");
         String::from_utf8(out).expect("text")
     }
 
@@ -56,7 +54,7 @@ mod tests {
         let text = written("scene", &"word ".repeat(40));
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
-        assert!(lines.iter().all(|line| line.len() <= WIDTH), "{text}");
+        assert!(lines.iter().all(|line| line.len() <= MOST), "{text}");
         assert!(lines[1].starts_with("           word word"), "{text}");
         assert_eq!(text.matches("word").count(), 40);
     }

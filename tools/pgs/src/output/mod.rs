@@ -5,6 +5,7 @@ pub(crate) mod files;
 pub(crate) mod order;
 pub(crate) mod progress;
 pub(crate) mod table;
+pub(crate) mod width;
 
 use std::time::Duration;
 

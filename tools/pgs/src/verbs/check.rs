@@ -2,7 +2,10 @@
 
 use std::io::Write;
 
-use bitstream_model::{BoardConfig, Coherency, Direction, InterruptWiring, Quirks, Resettable};
+use bitstream_model::interface::fence::Fence;
+use bitstream_model::{
+    BoardConfig, Coherency, Direction, InterruptWiring, Master, Quirks, Resettable,
+};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
@@ -12,18 +15,23 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::options::build::{BuildArgs, board_option};
 use crate::output::SCHEMA;
+use crate::output::facts::labelled;
+use crate::output::width::of_terminal;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs check
-  pgs check --json
-  pgs check --board uio:pgs@a0000000           a node of another name; `pgs list` shows them
+  pgs check --board emulated --json
   pgs check --board emulated --quirk stale     see what a failure looks like
+  pgs check --board emulated --fence 0x50000000+64M   DMA cores that reach this memory alone
+
+Examples on a board:
+  pgs check
+  pgs check --board uio:pgs@a0000000           a node of another name; `pgs list` shows them
 
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt; a failure
+/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, fence; a failure
 /// names the next step.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
@@ -56,6 +64,10 @@ enum QuirkName {
     HeldReset,
     /// The stream from the third DMA core carries nothing
     UnconnectedStream,
+    /// The fence does not hold the results of the second DMA core
+    OpenFence,
+    /// The device tree reserves no guard behind the fence
+    NoGuard,
 }
 
 impl QuirkName {
@@ -75,6 +87,8 @@ impl QuirkName {
             Self::StaleResults => quirks.coherency = Coherency::StaleWrites { from_byte },
             Self::HeldReset => quirks.held_reset = Some(Resettable::Dma(1)),
             Self::UnconnectedStream => quirks.unconnected = Some((2, Direction::Mm2s)),
+            Self::OpenFence => quirks.unfenced = &[(1, Master::Data(Direction::S2mm))],
+            Self::NoGuard => quirks.no_guard = true,
         }
         quirks
     }
@@ -83,7 +97,11 @@ impl QuirkName {
 impl CheckArgs {
     fn config(&self) -> BoardConfig {
         let quirks = self.quirk.map(QuirkName::quirks).unwrap_or_default();
-        BoardConfig { quirks, ..self.build.build().config() }
+        let config = self.build.build().config();
+        // These two are about a fence.
+        let needs = matches!(self.quirk, Some(QuirkName::OpenFence | QuirkName::NoGuard));
+        let fence = config.fence.or(needs.then(Fence::default));
+        BoardConfig { quirks, fence, ..config }
     }
 
     /// The first given option that only an emulated board has.
@@ -134,20 +152,25 @@ fn line_json(line: &CheckLine) -> Value {
 
 fn print(report: &CheckReport, out: &mut dyn Write) -> std::io::Result<()> {
     let (mut failed, mut skipped) = (0, 0);
+    // A file or a pipe gets whole lines, which programs can search.
+    let columns = of_terminal(std::io::stdout()).unwrap_or(usize::MAX);
+    let mut line = |begin: &str, name: &str, text: &str| {
+        labelled(out, &format!("{begin:<6}{name}"), 25, text, columns)
+    };
     for CheckLine { name, outcome, .. } in &report.lines {
         match outcome {
-            Outcome::Ok { detail } => writeln!(out, "ok    {name:<18} {detail}")?,
+            Outcome::Ok { detail } => line("ok", name, detail)?,
             Outcome::Failed { found, expected, next } => {
                 failed += 1;
-                writeln!(out, "FAIL  {name:<18} found {found}")?;
-                writeln!(out, "      {:<18} expected {expected}", "")?;
-                writeln!(out, "      {:<18} next: {next}", "")?;
+                line("FAIL", name, &format!("found {found}"))?;
+                line("", "", &format!("expected {expected}"))?;
+                line("", "", &format!("next: {next}"))?;
             }
             Outcome::Skipped { reason } => {
                 skipped += 1;
-                writeln!(out, "skip  {name:<18} {reason}")?;
+                line("skip", name, reason)?;
             }
-            _ => writeln!(out, "?     {name:<18}")?,
+            _ => line("?", name, "")?,
         }
     }
     let passed = report.lines.len() - failed - skipped;

@@ -15,7 +15,7 @@ use crate::output::SCHEMA;
 use crate::output::milliseconds;
 
 const EXAMPLES: &str = "\
-Examples:
+Examples on a board:
   pgs load zynq-pgs.bit.bin --overlay zynq-pgs.dtbo
   pgs load zynq-pgs.bit.bin
   pgs load --check zynq-pgs.bit.bin --overlay zynq-pgs.dtbo    on any machine
@@ -23,9 +23,9 @@ Examples:
   pgs load zynq-pgs.bit.bin --manager fpga1    if several FPGA managers may be the ZynqMP's
 
 Needs root and the vendor's kernel. A file outside the kernel's firmware folders is copied there
-during loading. Both files are judged by their content first: the chip, the end of the bitstream, the
-overlay's fragments, firmware-name and PL clock. The command refuses to load while a program has a
-device file of the logic, a u-dma-buf or /dev/mem open or locked. Without --replace-others it also
+during loading. Both files are judged by their content first: the chip, the end of the bitstream,
+the overlay's fragments, firmware-name and PL clock. The command refuses to load while a program has
+a device file of the logic, a u-dma-buf or /dev/mem open or locked. Without --replace-others it also
 refuses while another overlay is applied or a driver is bound to the logic. Remove the overlay by
 rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 

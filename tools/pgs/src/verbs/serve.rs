@@ -27,6 +27,8 @@ Examples:
   pgs --board socket:/tmp/board                   in another
   pgs serve --socket /tmp/board --memory file:/dev/shm/board --profile half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
+
+Examples with the Verilog in simulation (docs/bitstream.md):
   pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
 One driver at a time has the board; a connection that says nothing for 5 s is closed. A killed

@@ -36,12 +36,13 @@ const VELOCITIES_FRICTION: &str = "out_vel_friction.npy";
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs solve vectors/one_cube --compare
-  pgs solve vectors/pile10_step90 --out result --digest
-  pgs solve vectors/pile10_step90 --hazards unchecked --verify
-  pgs solve vectors/one_cube --vcd step.vcd --trace step.json --timeline step.svg
-  pgs solve vectors/pile10_step90 --compare --length-width 14 --address-width 32
-  pgs solve vectors/pile10_step90 --compare --contact-iterations 2 --friction-iterations 0 --no-integrate
+  pgs solve tests/golden/one_cube --compare
+  pgs solve tests/golden/pile5_step60 --out result --digest
+  pgs solve tests/golden/pile5_step60 --hazards unchecked --verify
+  pgs solve tests/golden/one_cube --vcd step.vcd --trace step.json --timeline step.svg
+  pgs solve tests/golden/pile5_step60 --compare --length-width 14 --address-width 32
+  pgs solve tests/golden/one_cube --compare --contact-iterations 2 --friction-iterations 0 \\
+      --no-integrate
 
 The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world
 frame:

@@ -18,17 +18,28 @@ fn lines_that(document: &Value, outcome: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_good_board_ends_with_0_and_eleven_lines() {
-    let ran = check(&[]);
+fn a_good_board_ends_with_0_and_twelve_lines() {
+    let ran = check(&["--fence", "0x50000000+64M"]);
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
-    assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("ok    ")).count(), 11);
-    assert!(ran.stdout.ends_with("11 ok, 0 failed, 0 skipped\n"), "{}", ran.stdout);
+    assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("ok    ")).count(), 12);
+    assert!(ran.stdout.ends_with("12 ok, 0 failed, 0 skipped\n"), "{}", ran.stdout);
     let document = check(&["--json"]).json();
     assert_eq!(document["schema"], 1);
     assert_eq!(document["verb"], "check");
     assert_eq!(document["board"]["kind"], "emulated");
     assert_eq!(document["passed"], true);
     assert_eq!(lines_that(&document, "ok").len(), 11);
+    assert_eq!(lines_that(&document, "skipped"), ["fence"]);
+}
+
+#[test]
+fn without_a_guard_the_fence_is_not_proven() {
+    let ran = check(&["--quirk", "no-guard"]);
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("\nskip  fence              not proven: "), "{}", ran.stdout);
+    let ran = check(&["--fence", "0x50000000+63M"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("a power of two"), "{}", ran.stderr);
 }
 
 #[test]
@@ -43,6 +54,7 @@ fn every_quirk_ends_with_1_and_fails_its_own_line_alone() {
         ("stale-results", "coherency", "at byte 0x400 of the buffer of dma0 S2MM"),
         ("unconnected-stream", "echo", "no end after 200ms: dma2 MM2S"),
         ("held-reset", "reset", "found dma1 MM2S in reset"),
+        ("open-fence", "fence", "found dma1 S2MM in reach of 0x54000000"),
     ] {
         let ran = check(&["--quirk", quirk]);
         assert_eq!(ran.code, Some(1), "{quirk}: {}{}", ran.stdout, ran.stderr);
@@ -58,7 +70,7 @@ fn every_quirk_ends_with_1_and_fails_its_own_line_alone() {
         assert_eq!(document["passed"], false, "{quirk}");
         assert_eq!(lines_that(&document, "failed"), [line], "{quirk}");
         let total = lines_that(&document, "ok").len() + lines_that(&document, "skipped").len() + 1;
-        assert_eq!(total, 11, "{quirk}");
+        assert_eq!(total, 12, "{quirk}");
     }
 }
 

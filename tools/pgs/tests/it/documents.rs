@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 use crate::common::{pgs, run};
 use serde_json::Value;
 
-fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// The text of a document, by its path below the root.
-fn text(document: &str) -> String {
+pub(crate) fn text(document: &str) -> String {
     fs::read_to_string(root().join(document)).unwrap_or_else(|error| panic!("{document}: {error}"))
 }
 
 /// The paths of `README.md` and of every page in `docs`.
-fn documents() -> Vec<String> {
+pub(crate) fn documents() -> Vec<String> {
     let pages = fs::read_dir(root().join("docs")).expect("the folder of the pages");
     let names = pages.map(|page| page.expect("an entry").file_name().into_string().expect("UTF-8"));
     let mut documents: Vec<_> =
@@ -28,7 +28,7 @@ fn documents() -> Vec<String> {
 }
 
 /// The fenced blocks of a document: what stands behind the opening fence, and the lines inside.
-fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
+pub(crate) fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut blocks = Vec::new();
     let mut open = None;
     for line in text.lines() {

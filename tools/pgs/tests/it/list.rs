@@ -99,6 +99,7 @@ fn each_node_says_what_it_is_and_how_it_is_used() {
     system.node(4, "other-design", &[("ctrl", 0xB000_0000)]);
     system.node(5, "axi-pmon", &[("pmon", 0xFD0B_0000)]);
     system.node(6, "pgs-memory", &[("memory", 0x5400_0000)]);
+    system.node(7, "pgs-guard", &[("guard", 0x5800_0000)]);
     let ran = system.list(&[]);
     for (number, texts) in [
         (0, ["--board uio:second", "uio-name = \"pgs-dma1\""]),
@@ -108,17 +109,19 @@ fn each_node_says_what_it_is_and_how_it_is_used() {
         (4, ["another device", "programmable logic"]),
         (5, ["another device", "axi-pmon"]),
         (6, ["pgs-memory", "usable"]),
+        (7, ["pgs-guard", "usable"]),
     ] {
         let text = line(&ran, &format!("uio node    uio{number}"));
         assert!(texts.iter().all(|expected| text.contains(expected)), "{text}");
     }
     let document = system.document();
-    let parts: Vec<_> = (0..7).map(|node| document["uio_nodes"][node]["part"].clone()).collect();
+    let parts: Vec<_> = (0..8).map(|node| document["uio_nodes"][node]["part"].clone()).collect();
     let none = Value::Null;
     let expected = ["dma1", "control", "unnamed", "memory"].map(Value::from);
     assert_eq!(parts[..4], expected);
-    assert_eq!(parts[4..], [none.clone(), none, Value::from("memory")]);
+    assert_eq!(parts[4..], [none.clone(), none.clone(), Value::from("memory"), none]);
     assert_eq!(document["uio_nodes"][3]["memory_option"], "uio:pgs-memory@50000000");
+    assert_eq!(document["uio_nodes"][7]["memory_option"], Value::Null, "the guard is no memory");
 }
 
 #[test]

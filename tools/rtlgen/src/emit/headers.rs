@@ -5,6 +5,7 @@ use pgs_interface::control::{
     self, ErrorCode, ITERATIONS_MAX, REGISTERS, channels, depth, dma, features, issue,
     memory_per_record, numbers,
 };
+use pgs_interface::fence::Fence;
 use pgs_interface::profile::{Depth, FLOAT, Inertia, solver};
 
 use crate::design::Design;
@@ -99,6 +100,7 @@ fn capabilities(text: &mut Text, design: &Design) {
         | features::WORLD_INERTIA.put(0, (parameters.inertia == Inertia::World).into())
         | features::INTERLOCKED.put(0, parameters.interlocked.into())
         | parameters.extensions().features();
+    let [fence_base, fence_size] = Fence::to_registers(Some(parameters.memory));
     let words = [
         ("IDENTIFICATION", control::IDENTIFICATION.reset),
         ("VERSION", control::VERSION.reset),
@@ -128,6 +130,8 @@ fn capabilities(text: &mut Text, design: &Design) {
         ),
         ("DMA", dma::ADDRESS_WIDTH.put(dma::LENGTH_WIDTH.put(0, LENGTH_BITS), ADDRESS_BITS)),
         ("NUMBERS", numbers::COLLISIONS.put(0, variant.numbers.collisions as u32)),
+        ("FENCE_BASE", fence_base),
+        ("FENCE_SIZE", fence_size),
     ];
     for (name, word) in words {
         constant(text, 32, &format!("CAPABILITY_{name}"), word);

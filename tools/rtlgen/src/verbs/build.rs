@@ -1,6 +1,7 @@
 //! The options that describe a build of the accelerator.
 
 use clap::{Args, ValueEnum};
+use pgs_interface::fence::Fence;
 use pgs_interface::profile::Inertia;
 use rtlgen::design::{Design, OddReadLatency, Parameters};
 use rtlgen::equations::WarmStart;
@@ -69,6 +70,10 @@ pub(crate) struct BuildArgs {
     /// An extension to leave out, for the cost of it
     #[arg(long, value_enum, value_name = "EXTENSION")]
     without: Vec<Extension>,
+    /// The only memory that the DMA masters reach, as 0x40000000+512M: a power of two of at least 64K, at a
+    /// multiple of it. The device tree must reserve the same
+    #[arg(long, value_name = "BASE+BYTES", default_value_t = Fence::default())]
+    memory: Fence,
     /// Clock that the capability register reports, kHz
     #[arg(long, value_name = "KHZ", default_value_t = Parameters::default().clock_khz)]
     clock_khz: u32,
@@ -95,6 +100,7 @@ impl BuildArgs {
             output_stages: self.output_stages,
             smallest_normal: self.smallest_normal == SmallestNormal::Exact,
             warm_start,
+            memory: self.memory,
             clock_khz: self.clock_khz,
         };
         parameters.check()?;

@@ -115,6 +115,7 @@ fn an_overlay_or_a_node_that_is_there_already_is_not_doubled() {
     assert_refused(&kernel, &error, "\"pgs\" (/dev/uio4)", "leave out --overlay");
     kernel.remove("sys/class/uio/uio4");
     kernel.add_node(1, "pgs-memory");
+    kernel.add_node(2, "pgs-guard");
     kernel.load(&file, true).expect("memory is in the base tree, and no obstacle");
 }
 

@@ -28,21 +28,25 @@ use crate::step_input;
 const EXAMPLES: &str = "\
 Examples:
   pgs compare float float,unchecked --grid 10x10x10 --steps 200
-  pgs compare float,hazard-free float,unchecked,as-given --input vectors/full_step186
-  pgs compare float,gpu float,as-given --input vectors/full_step186
-  pgs compare float half --input vectors/full_step186
+  pgs compare float,hazard-free float,unchecked,as-given --input tests/golden/pile5_step60
+  pgs compare float,gpu float,as-given --input tests/golden/pile5_step60
+  pgs compare float half --input tests/golden/pile5_step60
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
   pgs compare float,world mixed,world --scene shapes --grid 8x8x8
+
+Examples with the Verilog in simulation (docs/bitstream.md):
   pgs compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: binary16, thesis16, thesis16-literal (numbers on 16-bit streams), f32
-(arithmetic), interlocked, unchecked, keep, flush, isotropic, world; or window=SLOTS, bandwidth=GBPS, arithmetic=f32|binary16,
-length-width=BITS, address-width=BITS, threads=N and lanes=on|off. The order of a board's collisions
-is one of auto, as-given, hazard-free, hazard-free-nearby, body-by-body, body-by-body-oldest,
-body-by-body-newest, colours, gpu, random=SEED (see `pgs solve --help`). Without an order, a board that waits on hazards takes the collisions
-as given, so that two such boards solve them in the same order. Each board detects its own
-collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in model.
+(arithmetic), interlocked, unchecked, keep, flush, isotropic, world; or window=SLOTS,
+bandwidth=GBPS, arithmetic=f32|binary16, length-width=BITS, address-width=BITS, threads=N and
+lanes=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
+hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
+random=SEED (see `pgs solve --help`). Without an order, a board that waits on hazards takes the
+collisions as given, so that two such boards solve them in the same order. Each board detects its
+own collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in
+model.
 
 Only moving bodies are compared; A is the original. Relative deviations are |B - A| / |A| of each
 component (thesis eq. 4.1) and leave out components where A is 0. A velocity is within 1 % if it

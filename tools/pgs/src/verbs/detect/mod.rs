@@ -27,8 +27,8 @@ use crate::step_input;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs detect --input vectors/full_step186 --compare
-  pgs detect --input vectors/pile5_step60 --compare --json
+  pgs detect --input tests/golden/pile5_step60 --compare
+  pgs detect --input tests/golden/two_cubes --compare --json
   pgs detect --grid 20x20x20 --drop 0 --broad-phase sweep
 
 The folder is one for `pgs solve`. Body 0 is the ground, a box of 800 m whose top is y = 0; every

@@ -118,6 +118,7 @@ fn site_of(kind: FaultKind) -> Site {
         | K::ShortPacket
         | K::Corrupt { .. }
         | K::OtherBitstream { .. }
+        | K::Reloaded
         | K::PowerLost
         | K::IrqSpurious
         | K::IrqStorm { .. } => Site::Beats,

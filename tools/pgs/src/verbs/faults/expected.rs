@@ -51,6 +51,7 @@ pub(super) fn expected(kind: FaultKind, channel: Option<(usize, Direction)>) -> 
         K::AcceleratorError { code } => anywhere(name(code)),
         K::NoDone => anywhere("no-done"),
         K::OtherBitstream { .. } => lost("other-bitstream"),
+        K::Reloaded => anywhere("logic-reset"),
         K::PowerLost => lost("gone"),
         K::ResetNever => lost("deadline"),
         // The stall before the reset, and the hang, show only as silence.

@@ -33,8 +33,10 @@ Examples:
   pgs faults --profile float
   pgs faults --list               the fault of each cell, without trying it
   pgs faults --json > faults.json
-  pgs faults --accelerator rtl:target/rtl/pgs-rtl     stream faults, on the generated hardware too
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
+
+Examples with the Verilog in simulation (docs/bitstream.md):
+  pgs faults --accelerator rtl:rtl-sim/pgs-rtl     stream faults, on the generated hardware too
 
 Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go out.
 A cell is one fault at one place. It passes if the fault happened, and

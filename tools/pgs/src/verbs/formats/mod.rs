@@ -31,7 +31,7 @@ use step_folder::folder::Folder;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs formats --input vectors/full_step186
+  pgs formats --input tests/golden/pile5_step60
   pgs formats --grid 10x10x10 --step 70 --json
 
 The numbers are the ones that a step streams to the board, without unused contact points, indices
@@ -137,7 +137,7 @@ pub(crate) fn run(
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, common: &CommonArgs) -> Result<Option<Step>, Failure> {
     let build = args.build.build();
-    let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
+    let mut opened = board::open_as(common, &build, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;
     let mut scene = args.scene.build(&build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;

@@ -3,12 +3,10 @@
 use std::error::Error as _;
 
 use bitstream_model::interface::address_map::{
-    UIO_CONTROL_MAP, UIO_CONTROL_NODE, UIO_DMA_NODES, UIO_MEMORY_NODE, UIO_NODE,
+    UIO_CONTROL_MAP, UIO_CONTROL_NODE, UIO_DMA_NODES, UIO_GUARD_NODE, UIO_MEMORY_NODE, UIO_NODE,
 };
 use serde_json::{Value, json};
-use zynq_pgs::platform::{
-    FpgaManager, NodePart, System, UnreadableNode, try_device, try_u_dma_buf,
-};
+use zynq_pgs::platform::{FpgaManager, NodePart, System, UnreadableNode, try_node, try_u_dma_buf};
 use zynq_pgs::{PlatformError, UioNode};
 
 /// An error with its causes and next step, in one line.
@@ -41,7 +39,7 @@ impl Node {
         let (role, uses) = role(&node);
         // Other devices are not opened.
         let closed = match role.is_none() || uses.is_some() {
-            true => try_device(&system.dev.join(&node.device)).err(),
+            true => try_node(system, &node).err(),
             false => None,
         };
         let obstacles: Vec<_> = role.into_iter().chain(closed.as_ref().map(explained)).collect();
@@ -84,7 +82,8 @@ fn part_text(part: NodePart) -> &'static str {
 fn role(node: &UioNode) -> (Option<String>, Option<(&'static str, String)>) {
     let name = &node.name;
     let uio_name = |name: &str| format!("give it `linux,uio-name = {name:?}` in the device tree");
-    let parts = [UIO_CONTROL_NODE, UIO_MEMORY_NODE].into_iter().chain(UIO_DMA_NODES);
+    let others = [UIO_CONTROL_NODE, UIO_MEMORY_NODE, UIO_GUARD_NODE];
+    let parts = others.into_iter().chain(UIO_DMA_NODES);
     if name == UIO_NODE && node.map(UIO_CONTROL_MAP).is_err() {
         let reason =
             format!("no map named {UIO_CONTROL_MAP:?}: is this the accelerator's overlay?");

@@ -75,7 +75,11 @@ impl Outcome {
     }
     /// Computes with both energies unrounded, not with the printed ones.
     pub(crate) fn energy(&self, platform: &Platform) -> f64 {
-        platform.watts * platform.latency_ms / 1e3 / self.joules()
+        self.energy_at(platform.watts, platform)
+    }
+    /// The same with another power of the platform, W.
+    fn energy_at(&self, watts: f64, platform: &Platform) -> f64 {
+        watts * platform.latency_ms / 1e3 / self.joules()
     }
     fn whole_step(&self) -> f64 {
         amdahl(ACCELERATED_SHARE, self.speedup(&GPU))
@@ -87,8 +91,8 @@ struct Figure {
     /// The thesis' table.
     table: fn(&Design) -> &'static str,
     name: &'static str,
-    /// The printed figure.
-    printed: fn(&Design) -> f64,
+    /// The printed figure, if there is one.
+    printed: fn(&Design) -> Option<f64>,
     /// How to compute the figure: from a latency, or from the thesis' powers alone.
     of: Source,
 }
@@ -98,59 +102,83 @@ enum Source {
     Powers(f64),
 }
 
-const FIGURES: [Figure; 9] = [
+const FIGURES: [Figure; 13] = [
     Figure {
         table: |design| design.comparison,
         name: "latency, ms",
-        printed: |design| design.latency_ms,
+        printed: |design| Some(design.latency_ms),
         of: Source::Latency(|outcome| outcome.ms),
     },
     Figure {
         table: |design| design.comparison,
         name: "energy at 15 W, J",
-        printed: |design| design.joules,
+        printed: |design| Some(design.joules),
         of: Source::Latency(Outcome::joules),
     },
     Figure {
         table: |design| design.speedups,
         name: "speed-up over GTX 980",
-        printed: |design| design.speedup.gpu,
+        printed: |design| Some(design.speedup.gpu),
         of: Source::Latency(|outcome| outcome.speedup(&GPU)),
     },
     Figure {
         table: |design| design.speedups,
         name: "speed-up over i7-3770",
-        printed: |design| design.speedup.cpu,
+        printed: |design| Some(design.speedup.cpu),
         of: Source::Latency(|outcome| outcome.speedup(&CPU)),
     },
     Figure {
         table: |design| design.efficiencies,
         name: "power efficiency over GTX 980",
-        printed: |design| design.power.gpu,
+        printed: |design| Some(design.power.gpu),
         of: Source::Powers(GPU.watts / ZCU102_WATTS),
     },
     Figure {
         table: |design| design.efficiencies,
         name: "power efficiency over i7-3770",
-        printed: |design| design.power.cpu,
+        printed: |design| Some(design.power.cpu),
         of: Source::Powers(CPU.watts / ZCU102_WATTS),
     },
     Figure {
         table: |design| design.efficiencies,
         name: "energy efficiency over GTX 980",
-        printed: |design| design.energy.gpu,
+        printed: |design| Some(design.energy.gpu),
         of: Source::Latency(|outcome| outcome.energy(&GPU)),
     },
     Figure {
         table: |design| design.efficiencies,
         name: "energy efficiency over i7-3770",
-        printed: |design| design.energy.cpu,
+        printed: |design| Some(design.energy.cpu),
         of: Source::Latency(|outcome| outcome.energy(&CPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency, GTX 980 TDP",
+        printed: |_| None,
+        of: Source::Powers(GPU.design_watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency, i7-3770 TDP",
+        printed: |_| None,
+        of: Source::Powers(CPU.design_watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency, GTX 980 TDP",
+        printed: |_| None,
+        of: Source::Latency(|outcome| outcome.energy_at(GPU.design_watts, &GPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency, i7-3770 TDP",
+        printed: |_| None,
+        of: Source::Latency(|outcome| outcome.energy_at(CPU.design_watts, &CPU)),
     },
     Figure {
         table: |_| "eq 6.5",
         name: "whole step over GTX 980's",
-        printed: |design| design.whole_step,
+        printed: |design| Some(design.whole_step),
         of: Source::Latency(Outcome::whole_step),
     },
 ];
@@ -184,6 +212,11 @@ fn against(scene: &Scene) -> Table {
          12.8 GB/s. Time and power of GPU and CPU, the board's 15 W and the share of 60 % in equation \
          6.5 are the thesis'; no figure was measured here.",
     );
+    table.note(format!(
+        "TDP: with the {} and {} W that T6.2 and T6.3 print for the same GPU and CPU, in place of \
+         the {} and {} W that the thesis divides by.",
+        GPU.design_watts, CPU.design_watts, GPU.watts, CPU.watts
+    ));
     table.note(
         "The thesis divides energies that it has rounded to two digits; 133 W over 15 W is 8.87, not \
          8.67. Its Figures 6.1 and 6.2 chart its first design, naive, and its text prints no numbers of \
@@ -196,7 +229,7 @@ fn against(scene: &Scene) -> Table {
 fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
     let design = Design::of(variant.profile);
     let number = |value| Cell::Number(value, 2);
-    let printed = design.map(figure.printed);
+    let printed = design.and_then(figure.printed);
     let (recomputed, ours, kind) = match figure.of {
         Source::Powers(found) => {
             // Every figure of the row is the thesis'.

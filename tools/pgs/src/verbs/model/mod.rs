@@ -30,6 +30,8 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
 use crate::options::build::number;
+use crate::output::facts::labelled;
+use crate::output::width::stdout_width;
 use scene::Scene;
 use table::Table;
 
@@ -240,7 +242,7 @@ pub(crate) fn run(
         }
     } else {
         for line in head {
-            writeln!(out, "{line}")?;
+            labelled(out, "", 0, &line, stdout_width())?;
         }
         writeln!(out)?;
         for table in &tables {

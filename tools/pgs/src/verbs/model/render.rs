@@ -4,9 +4,10 @@ use std::io::{self, Write};
 
 use super::table::{Cell, Table};
 use crate::numbers::grouped;
+use crate::output::width::{stdout_width, wrapped};
 
-/// Column before which notes are broken.
-const WIDTH: usize = 100;
+/// Columns before a line of a note.
+const BULLET: usize = 4;
 
 /// A cell as people read it.
 pub(crate) fn shown(cell: &Cell) -> String {
@@ -38,24 +39,6 @@ pub(crate) fn at_right(table: &Table, column: usize) -> bool {
     table.rows.iter().any(|row| number(&row[column]))
 }
 
-/// Breaks a note into lines of at most the terminal's width; a longer word stays whole.
-fn wrapped(note: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in note.split_whitespace() {
-        let line = lines.last_mut().map_or(0, |line| line.len());
-        if line > 0 && line + 1 + word.len() > WIDTH {
-            lines.push(String::new());
-        }
-        if let Some(line) = lines.last_mut() {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines
-}
-
 /// Writes a table in aligned columns.
 pub(super) fn terminal(out: &mut dyn Write, table: &Table) -> io::Result<()> {
     writeln!(out, "{}", table.title)?;
@@ -79,7 +62,7 @@ pub(super) fn terminal(out: &mut dyn Write, table: &Table) -> io::Result<()> {
         writeln!(out, "{}", line.trim_end())?;
     }
     for note in &table.notes {
-        for (k, line) in wrapped(note).iter().enumerate() {
+        for (k, line) in wrapped(note, stdout_width().saturating_sub(BULLET)).iter().enumerate() {
             writeln!(out, "  {} {line}", if k == 0 { "*" } else { " " })?;
         }
     }
@@ -144,12 +127,5 @@ mod tests {
             "### A table\n\n| name | n | diff. |\n| :-- | --: | --: |\n| a\\|b | 1,234 | +0.17 % |\n\
              | c | - | 2.0 |\n\n- Said.\n\n"
         );
-    }
-
-    #[test]
-    fn notes_are_broken_between_words() {
-        let lines = wrapped(&"word ".repeat(50));
-        assert!(lines.len() > 1 && lines.iter().all(|line| line.len() <= WIDTH));
-        assert_eq!(lines.join(" "), "word ".repeat(50).trim_end());
     }
 }

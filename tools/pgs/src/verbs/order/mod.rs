@@ -24,8 +24,8 @@ use source::Source;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs order --input vectors/full_step186
-  pgs order --input vectors/full_step186 --depth 64 --curve live.svg
+  pgs order --input tests/golden/pile5_step60
+  pgs order --input tests/golden/pile5_step60 --depth 64 --curve live.svg
   pgs order --spheres 20000
   pgs order --grid 10x10x10 --drop 0.5 --steps 60 --json
 

@@ -20,6 +20,8 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
 ];
+/// Units of the view box beside the bars: the axis with its numbers, and the margins.
+const BESIDE_BARS: u32 = 66 + 2 * 8;
 /// Size of the numbers at the axes.
 const SMALL: i32 = 13;
 
@@ -225,6 +227,9 @@ pub(super) fn bars(
         let centred = ("sans-serif", SMALL, &INK)
             .into_text_style(area)
             .pos(Pos::new(HPos::Center, VPos::Bottom));
+        let numbers = ("sans-serif", number_size(slots, &values.concat()), &INK)
+            .into_text_style(area)
+            .pos(Pos::new(HPos::Center, VPos::Bottom));
         let mut from = 0.5;
         for (group, values) in groups.iter().zip(values) {
             let width = f64::from(u32::try_from(names.len()).unwrap_or(u32::MAX));
@@ -237,7 +242,7 @@ pub(super) fn bars(
                     let bar =
                         Rectangle::new([(from + 0.06, 0.0), (from + 0.94, value)], colour.filled());
                     chart.draw_series([bar]).map_err(failed)?;
-                    let number = Text::new(format!("{value:.2}"), (0, -3), centred.clone());
+                    let number = Text::new(three_digits(value), (0, -3), numbers.clone());
                     let above = EmptyElement::at((from + 0.5, value)) + number;
                     chart.draw_series([above]).map_err(failed)?;
                 }
@@ -247,6 +252,26 @@ pub(super) fn bars(
         }
         Ok(())
     })
+}
+
+/// The number above a bar.
+fn three_digits(value: f64) -> String {
+    match value {
+        _ if value < 10.0 => format!("{value:.2}"),
+        _ if value < 100.0 => format!("{value:.1}"),
+        _ => format!("{value:.0}"),
+    }
+}
+
+/// Width of a digit, as a share of the size of its letters.
+const DIGIT: f64 = 0.6;
+
+/// The size of the numbers above bars, at which none reaches into its neighbour's place.
+fn number_size(slots: usize, values: &[Option<f64>]) -> i32 {
+    let digits = values.iter().flatten().map(|value| three_digits(*value).len()).max();
+    let place = f64::from(SIZE.0 - BESIDE_BARS) / slots.max(1) as f64;
+    let fits = |size: &i32| DIGIT * f64::from(*size) * digits.unwrap_or(1) as f64 <= place;
+    (1..=SMALL).rev().find(fits).unwrap_or(1)
 }
 
 /// Draws a chart below its legend, which one series alone does not need.
@@ -306,6 +331,8 @@ fn themed(text: &str) -> String {
 mod tests {
     use super::*;
 
+    const PROFILE_NAMES: [&str; 6] = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
+
     #[test]
     fn a_logarithmic_chart_has_a_label_a_decade_and_leaves_out_zeros() {
         let series = [
@@ -319,6 +346,31 @@ mod tests {
         assert_eq!(text.matches("<circle").count(), 1);
         assert!(!text.contains("#010203") && text.contains("currentColor"), "{text}");
         assert!(text.contains("viewBox") && !text.contains("width=\"860\" height"), "{text}");
+    }
+
+    #[test]
+    fn the_numbers_above_bars_do_not_meet() {
+        let groups = PROFILE_NAMES.map(str::to_owned);
+        let names = ["a", "b", "c", "d"].map(str::to_owned);
+        let values = vec![vec![Some(35.724), Some(35.72), Some(64.09), Some(64.0)]; groups.len()];
+        let text = bars("times", &groups, &names, &values).expect("a chart");
+        let attribute = |tag: &str, name: &str| {
+            let (_, value) = tag.split_once(&format!(" {name}=\""))?;
+            value.split('"').next()?.parse::<f64>().ok()
+        };
+        let mut numbers: Vec<(f64, f64)> = Vec::new();
+        for tag in text.split("<text").skip(1) {
+            let label = tag.split_once('>').and_then(|(_, text)| text.split('<').next());
+            let label = label.unwrap_or_default().trim();
+            if ["35.7", "64.1", "64.0"].contains(&label) {
+                let [x, size] =
+                    ["x", "font-size"].map(|name| attribute(tag, name).expect("a number"));
+                let half = label.len() as f64 * DIGIT * size / 2.0;
+                numbers.push((x - half, x + half));
+            }
+        }
+        assert_eq!(numbers.len(), 24, "{text}");
+        assert!(numbers.windows(2).all(|pair| pair[0].1 <= pair[1].0 + 1.0), "{numbers:?}");
     }
 
     #[test]

@@ -7,9 +7,9 @@ use super::place::section_key;
 /// The origin of a figure or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Origin {
-    /// Computed by a formula of the model, or counted.
+    /// Computed by a formula, counted, or a time of the emulated board.
     Modelled,
-    /// Measured on this machine, in steps of the emulated board.
+    /// Measured on this machine: results of steps, or the host's time.
     Measured,
     /// Printed in the thesis.
     Recorded,
@@ -43,10 +43,8 @@ impl Origin {
     /// The meaning of the mark.
     pub(super) const fn meaning(self) -> &'static str {
         match self {
-            Self::Modelled => "counted, or computed by a formula",
-            Self::Measured => {
-                "measured on this machine: steps of the emulated board, or the host's time"
-            }
+            Self::Modelled => "counted, computed by a formula, or a time of the emulated board",
+            Self::Measured => "measured on this machine: results of steps, or the host's time",
             Self::Recorded => "a figure that the thesis prints",
             Self::Open => "not known: no figure of ours",
         }

@@ -41,7 +41,7 @@ const EXAMPLES: &str = "\
 Examples:
   pgs report --out report
   pgs report --out report --quick
-  pgs report --out report --input vectors/full_step186
+  pgs report --out report --quick --input tests/golden/pile5_step60
 
 Writes report.html, one page that needs no network, report.md, report.json, and figures/*.svg. With
 a folder, rows that need a step of Bullet take its step; without one they take a step of our own

@@ -17,10 +17,17 @@ use zynq_pgs::emulation::Build;
 /// Depth of the pipeline at which orders are compared, issue slots.
 pub(super) const DEPTH: u32 = 64;
 
+/// A folder as the report names it: as it was given, or only its name. A report is passed on, and the
+/// folders of its author's machine mean nothing to its readers.
+pub(super) fn shown(folder: &Path) -> String {
+    let name = folder.file_name().filter(|_| folder.is_absolute());
+    name.map_or(folder, Path::new).display().to_string()
+}
+
 /// The input of a step.
 #[derive(Debug)]
 pub(super) struct Step {
-    /// The step for people, such as "the step in `vectors/full_step186`".
+    /// The step for people, such as "the step in `tests/golden/pile5_step60`".
     pub(super) name: String,
     /// Options of other verbs that take the same step.
     options: Options,
@@ -38,7 +45,7 @@ enum Options {
 impl Step {
     pub(super) fn folder(path: &Path) -> Result<Self, Failure> {
         let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
-        let shown = path.display().to_string();
+        let shown = shown(path);
         let name = format!("the step in {shown}");
         Ok(Self { name, options: Options::Folder(shown), bodies, shapes, collisions })
     }
@@ -82,5 +89,17 @@ impl Step {
             Options::Folder(path) => format!("{verb} --input {}", quoted(path)),
             Options::Pile { grid, steps } => format!("{verb} --grid {grid} {}", step(*steps)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_report_names_no_folder_above_that_of_the_step() {
+        let names = ["tests/golden/two_cubes", "/home/somebody/two_cubes/", "/"];
+        let found = names.map(|name| shown(Path::new(name)));
+        assert_eq!(found, ["tests/golden/two_cubes", "two_cubes", "/"]);
     }
 }

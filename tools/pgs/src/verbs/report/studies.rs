@@ -1,10 +1,13 @@
 //! The studies behind the report's figures, with the commands that repeat them.
 
+use std::path::Path;
+
 use clap::{Args, Command};
 use scene::Grid;
 
 use super::ReportArgs;
 use super::chart::{Axis, Drawn, Series, lines};
+use super::step::shown;
 use crate::failure::{Cause, Failure};
 use crate::histogram::Histogram;
 use crate::verbs::study::recorded::RecordedDeviation;
@@ -33,8 +36,8 @@ fn options<T: Args>(study: &str, words: &[String]) -> Result<(String, T), Failur
     let matches = T::augment_args(Command::new("study"))
         .try_get_matches_from(std::iter::once(&name).chain(words))
         .and_then(|matches| T::from_arg_matches(&matches));
-    let shown: Vec<String> = words.iter().map(|word| quoted(word)).collect();
-    let command = format!("pgs study {study} {}", shown.join(" "));
+    let named: Vec<String> = words.iter().map(|word| quoted(&shown(Path::new(word)))).collect();
+    let command = format!("pgs study {study} {}", named.join(" "));
     let options = matches
         .map_err(|error| Failure::new(Cause::Input, format!("{command} is refused: {error}")))?;
     Ok((command, options))
@@ -68,9 +71,8 @@ impl<'a> Effort<'a> {
         let ReportArgs { input, step, .. } = self.args;
         match input {
             Some(path) => {
-                let path = path.display().to_string();
-                let subject = format!("the step in {path}");
-                (vec!["--input".to_owned(), path], subject)
+                let subject = format!("the step in {}", shown(path));
+                (vec!["--input".to_owned(), path.display().to_string()], subject)
             }
             None => {
                 let (grid, from) = (self.args.pile(), step.saturating_sub(1));
@@ -235,6 +237,9 @@ mod tests {
             options::<determinism::Options>("determinism", &words).expect("parsed");
         assert_eq!(command, "pgs study determinism --grid 3x3x3 --steps 2 --pairs 1");
         assert_eq!(parsed.pairs, Some(1));
+        let words = ["--input", "/home/somebody/two_cubes"].map(str::to_owned);
+        let (command, _) = options::<determinism::Options>("determinism", &words).expect("parsed");
+        assert_eq!(command, "pgs study determinism --input two_cubes");
         assert!(options::<determinism::Options>("determinism", &["--no".to_owned()]).is_err());
         assert_eq!(quoted("../a/step_1"), "../a/step_1");
         assert_eq!(quoted("my step's"), "'my step'\\''s'");

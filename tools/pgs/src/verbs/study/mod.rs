@@ -29,10 +29,10 @@ use crate::output::SCHEMA;
 const EXAMPLES: &str = "\
 Examples:
   pgs study time-step
-  pgs study stopping --input vectors/pile5_step60
+  pgs study stopping --input tests/golden/pile5_step60
   pgs study split
-  pgs study determinism --input vectors/full_step186
-  pgs study half --input vectors/full_step186
+  pgs study determinism --input tests/golden/pile5_step60
+  pgs study half --input tests/golden/pile5_step60
   pgs study ladder --json
 
 `pgs study NAME --help` tells how each one measures.";

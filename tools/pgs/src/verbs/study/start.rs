@@ -108,7 +108,7 @@ impl<'a> Start<'a> {
         session: &Session,
     ) -> Result<OpenBoard, Failure> {
         let config = self.args.scene.config(build);
-        let mut opened = board::open_as(common, build, config)?;
+        let mut opened = board::open_as(common, build, config)?.stated();
         match &self.folder {
             Some(folder) => {
                 let most = opened.accelerator.capabilities().shapes_max();

@@ -105,7 +105,8 @@ pub(crate) fn part() -> Result<Part, Failure> {
             "§6.5, Figure 6.2",
             "Energy efficiency of each design over GPU and CPU",
             [&energy[0], &energy[1]],
-            "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured.",
+            "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured. \
+             The table of the comparison has the thermal design powers of its Tables 6.2 and 6.3 beside them.",
         )?,
     ];
     let rows = [(&figures[0], &speed, "speed-up"), (&figures[1], &energy, "energy efficiency")]

@@ -61,7 +61,7 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
         title: title.to_owned(),
         svg,
         caption: caption.to_owned(),
-        origin: Origin::Measured,
+        origin: Origin::Modelled,
         playback: None,
     };
     let figures = vec![
@@ -95,7 +95,7 @@ pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
         subject: format!("a step of {} cubes, profile {}", SIDE * SIDE * SIDE, profile.name),
         recorded: "a drawing, no numbers".to_owned(),
         ours: format!("{} cycles on the emulated board", grouped(cycles)),
-        origin: Origin::Measured,
+        origin: Origin::Modelled,
         command: command(profile),
         shown: figure.id.to_owned(),
     };

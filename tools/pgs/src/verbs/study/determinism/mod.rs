@@ -23,7 +23,7 @@ pub(super) use show::show;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs study determinism --input vectors/full_step186
+  pgs study determinism --input tests/golden/pile5_step60
   pgs study determinism --grid 10x10x10 --steps 200
   pgs study determinism --drop 5 --pairs 2 --steps 150 --json > orders.json
   pgs study determinism --grid 8x8x8 --from 70 --steps 1

@@ -24,7 +24,7 @@ pub(super) use show::show;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs study half --input vectors/full_step186
+  pgs study half --input tests/golden/pile5_step60
   pgs study half --drop 5 --steps 240
   pgs study half --grid 10x10x10 --build half --build half,f32 --build mixed --json
 

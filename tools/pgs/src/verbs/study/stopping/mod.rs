@@ -33,7 +33,7 @@ use step_folder::folder::Folder;
 const EXAMPLES: &str = "\
 Examples:
   pgs study stopping
-  pgs study stopping --input vectors/pile5_step60 --passes 60
+  pgs study stopping --input tests/golden/pile5_step60 --passes 60
   pgs study stopping --grid 10x10x10 --steps 90 --spin-damping 0 --json
 
 The residual is a speed in m/s: over all contacts min(L / m, e + b), with L the impulse, m the
@@ -130,7 +130,7 @@ impl Step {
 
 /// Takes the step with each number of passes.
 pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
-    let mut opened = board::open(&session.common, &Build::default())?;
+    let mut opened = board::open(&session.common, &Build::default())?.stated();
     session.watch(&mut opened);
     let step = match &options.input {
         Some(path) => Some(folder(path, options)?),

@@ -117,7 +117,7 @@ pub(crate) struct Sample {
 /// Takes the steps of every length.
 pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
     scenes::check_rows(options.grid)?;
-    let mut opened = board::open(&session.common, &Build::default())?;
+    let mut opened = board::open(&session.common, &Build::default())?.stated();
     session.watch(&mut opened);
     let scene = scene(options)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
