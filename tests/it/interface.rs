@@ -25,7 +25,7 @@ fn regions_stand_where_the_block_design_puts_them() {
     assert_eq!((address_map::UIO_GUARD_NODE, address_map::GUARD_BYTES), ("pgs-guard", 0x1_0000));
 }
 
-/// FENCE_BASE and FENCE_SIZE count 64 KiB, and a size of 0 is no fence.
+/// `FENCE_BASE` and `FENCE_SIZE` count 64 KiB, and a size of 0 is no fence.
 #[test]
 fn the_fence_is_reported_in_units_of_64_kib() {
     assert_eq!(FENCE_UNIT, 0x1_0000);

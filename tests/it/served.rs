@@ -101,7 +101,7 @@ fn at(socket: &Path) -> OpenOptions {
     OpenOptions { board, ..OpenOptions::default() }
 }
 
-/// The driver's memory is the file's 64 MiB at 0x5000_0000.
+/// The driver's memory is the file's 64 MiB at `0x5000_0000`.
 #[test]
 fn memory_outside_the_fence_is_refused_by_name_before_a_step() {
     let fence = |text: &str| Some(text.parse::<Fence>().expect("a fence"));

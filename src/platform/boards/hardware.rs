@@ -154,10 +154,15 @@ impl HardwarePlatform {
             (_, None) => open_memory(system, memory)?,
         };
         log::info!("memory for DMA: {} bytes at {:#x}", region.bytes(), region.address());
-        Ok(Self::assemble(registers, region, logic))
+        Ok(Self::assemble(system, registers, region, logic))
     }
 
-    fn assemble(registers: Registers, region: Box<dyn Region>, logic: LogicState) -> Self {
+    fn assemble(
+        system: &System,
+        registers: Registers,
+        region: Box<dyn Region>,
+        logic: LogicState,
+    ) -> Self {
         Self {
             registers,
             pool: Pool::new(region),
@@ -392,7 +397,7 @@ mod tests {
         };
         let (_, memory) = reserved(0x6000_0000, 1 << 16);
         let logic = LogicState::open(system, manager).expect("it runs");
-        HardwarePlatform::assemble(registers, Box::new(memory), logic)
+        HardwarePlatform::assemble(system, registers, Box::new(memory), logic)
     }
 
     /// The device with the interrupt.

@@ -32,7 +32,7 @@ pub struct Parameters {
     /// Whether impulses come in (warm start) and go out: FEATURES bit 8. Without it, bits 3 and 4 of FLAGS
     /// have no effect.
     pub warm_start: WarmStart,
-    /// The one address segment of every DMA master in the block design, which FENCE_BASE and FENCE_SIZE
+    /// The one address segment of every DMA master in the block design, which `FENCE_BASE` and `FENCE_SIZE`
     /// report.
     pub memory: Fence,
     /// Clock that `CLOCK_KHZ` reports, kHz.
