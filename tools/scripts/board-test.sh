@@ -55,7 +55,7 @@ attend "$scripts/kernel/$kernel.sh" "$work/$kernel"
 content=$work/board-content
 rm -rf "$content"
 mkdir -p "$content/bin" "$content/expected" "$content/golden"
-for program in pgs pgs-trap uio-probe; do
+for program in pgs pgs-trap uio-probe uio-unplug; do
 	install -m 755 "$target_root/aarch64/aarch64-unknown-linux-gnu/release/$program" "$content/bin/"
 done
 for folder in "${golden[@]}"; do cp -r "tests/golden/${folder%/}" "$content/golden/"; done

@@ -91,12 +91,12 @@ type Lost = Arc<OnceLock<String>>;
 /// A register region that is not touched once the board is lost: an access to logic without a clock
 /// hangs the processor.
 #[derive(Debug)]
-struct Guarded {
+struct UnlessLost {
     registers: Box<dyn RegisterWindow>,
     lost: Lost,
 }
 
-impl RegisterWindow for Guarded {
+impl RegisterWindow for UnlessLost {
     fn bytes(&self) -> u64 {
         self.registers.bytes()
     }
@@ -298,7 +298,7 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
 impl Platform for HardwarePlatform {
     fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
         let registers = self.registers_of(map)?;
-        Ok(Box::new(Guarded { registers, lost: Arc::clone(&self.lost) }))
+        Ok(Box::new(UnlessLost { registers, lost: Arc::clone(&self.lost) }))
     }
 
     fn memory(&self) -> &dyn DmaMemorySource {

@@ -8,6 +8,7 @@
 mod checks;
 mod engine;
 mod transfer;
+mod unbound;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -19,7 +20,7 @@ pub(crate) type Outcome = Result<String, Box<dyn Error>>;
 type Check = (&'static str, fn() -> Outcome);
 
 fn main() -> ExitCode {
-    let checks: [Check; 8] = [
+    let checks: [Check; 10] = [
         ("nodes are found by name", checks::nodes_by_name),
         ("accesses are confined", checks::confined),
         ("reserved memory keeps beats", checks::memory),
@@ -28,6 +29,8 @@ fn main() -> ExitCode {
         ("interrupt suppressed in the engine", transfer::suppressed_in_engine),
         ("interrupt masked in the kernel", transfer::masked_in_kernel),
         ("interrupt not acknowledged", transfer::not_acknowledged),
+        ("a node with an interrupt, unbound while open", unbound::with_interrupt),
+        ("a node without an interrupt, unbound while open", unbound::without_interrupt),
     ];
     let mut failed = 0;
     for (name, check) in checks {

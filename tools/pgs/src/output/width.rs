@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use terminal_size::{Width, terminal_size_of};
 
-/// The most columns of a line, and those of a line that no terminal shows.
+/// The most columns of a line; a line that no terminal shows has room for all.
 pub(crate) const MOST: usize = 100;
 
 /// Columns of a line on stdout.
@@ -21,7 +21,7 @@ pub(crate) fn of_terminal(stream: impl AsFd) -> Option<usize> {
     terminal_size_of(stream).map(|(Width(columns), _)| MOST.min(columns.into()))
 }
 
-/// Breaks a text between words into lines of at most that many columns; a longer word stays whole.
+/// Breaks a text between words into lines of at most `columns`; a longer word stays whole.
 pub(crate) fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut used = 0;

@@ -17,7 +17,7 @@ use crate::common::{Ran, Tied, run, signal};
 use crate::documents::{blocks, documents, root, text};
 
 const IN_SMALL: bool = cfg!(debug_assertions);
-/// What stands behind the `sh` of a block whose commands need more than a clone.
+/// The words behind the `sh` of a block whose commands need more than a clone.
 const NEEDS: [&str; 5] = ["board", "root", "vivado", "verilator", "yocto"];
 /// The place of the socket in the examples.
 const SOCKET: &str = "/tmp/board";
@@ -107,7 +107,7 @@ fn of_page(page: &str) -> Vec<Example> {
     examples
 }
 
-/// The words of a command, of which one in quotes is one.
+/// The words of a command; a text in quotes is one word.
 fn words(command: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quoted = false;

@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 
 use crate::common::{Ran, run, skipped};
 
-/// Runs `pgs` on a terminal of that many columns, by util-linux's `script`; the lines that it shows.
+/// Runs `pgs` on a terminal of this width, by util-linux's `script`; the lines that it shows.
 fn on_terminal(columns: usize, arguments: &str) -> Vec<String> {
     let pgs = env!("CARGO_BIN_EXE_pgs");
     let command = format!("stty rows 24 cols {columns}; exec '{pgs}' {arguments}");

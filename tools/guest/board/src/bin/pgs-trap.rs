@@ -10,6 +10,7 @@ fn main() -> ExitCode {
 
     use guest_board::trap::{TraceError, become_traced, run};
 
+    env_logger::init();
     let program: Vec<OsString> = std::env::args_os().skip(1).collect();
     let fail = |error: TraceError| {
         eprintln!("pgs-trap: {error}");

@@ -340,6 +340,7 @@ impl Tracer {
             self.counts.reads += 1;
             Access::Read { address }
         };
+        log::trace!("{request}");
         let loaded = self.host.request(request)?;
         general.complete(&access, loaded);
         (registers.regs, registers.sp) = (general.x, general.sp);
