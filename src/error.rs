@@ -40,6 +40,17 @@ pub enum Error {
     /// An earlier fault could not be cleared.
     #[error("the board was given up after an earlier fault: open it again")]
     MustReopen,
+    /// The call came from another process than the one that opened the accelerator: from a child that
+    /// was forked since. No register was touched. A child that drops the accelerator frees memory of
+    /// its own alone.
+    #[error(
+        "the accelerator belongs to process {opener}, which opened it, and this is a process forked \
+         from it: open a board after the fork, in the process that uses it"
+    )]
+    OtherProcess {
+        /// Number of the process that opened it.
+        opener: u32,
+    },
 }
 
 /// The state of the board after a failed step.
@@ -104,7 +115,11 @@ impl Error {
     /// Whether the board must be opened again first.
     #[must_use]
     pub fn must_reopen(&self) -> bool {
-        matches!(self, Self::MustReopen | Self::Step { aftermath: Aftermath::MustReopen, .. })
+        match self {
+            Self::MustReopen | Self::OtherProcess { .. } => true,
+            Self::Step { aftermath, .. } => *aftermath == Aftermath::MustReopen,
+            _ => false,
+        }
     }
 }
 
@@ -208,6 +223,7 @@ mod tests {
         assert_eq!(answers(&step(Aftermath::Untouched)), (false, false, false));
         assert_eq!(answers(&step(Aftermath::MustReopen)), (false, false, true));
         assert_eq!(answers(&Error::MustReopen), (false, false, true));
+        assert_eq!(answers(&Error::OtherProcess { opener: 1 }), (false, false, true));
     }
 
     #[test]

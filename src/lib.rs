@@ -31,7 +31,7 @@
 //! let contacts = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
 //! let pair = Collision { body_a: 0, body_b: 1, normal: [0.0, -1.0, 0.0], count: 4, contacts };
 //!
-//! let step = accelerator.submit(&bodies, &[pair][..], &StepParameters::default())?;
+//! let step = accelerator.submit(&bodies, &[pair], &StepParameters::default())?;
 //! // Sound, pictures, input, while the board works.
 //! let report = step.wait(&mut bodies)?;
 //! assert!(bodies[1].velocity.linear[1] > -0.2, "the ground has stopped the cube");

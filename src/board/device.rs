@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
+use pgs_support::Process;
 
 use super::anomalies::Anomalies;
 use super::bank::{Bank, PerBank};
@@ -66,6 +67,8 @@ pub(crate) struct Device {
     /// Whether the board was given up: no register may be accessed any more.
     pub(crate) dead: bool,
     activity: Activity,
+    /// The process that has opened the board.
+    pub(crate) process: Process,
     /// The caller's way to end a step early.
     pub(crate) cancellation: Option<Cancellation>,
     /// The longest piece that a descriptor carries, bytes.
@@ -146,6 +149,7 @@ impl Device {
             anomalies: Anomalies::default(),
             dead: false,
             activity: Activity::Idle,
+            process: Process::this(),
             cancellation: None,
             largest: largest_piece(capabilities.length_width),
             packers: PackPool::new(None),
@@ -384,9 +388,9 @@ impl Device {
 
 impl Drop for Device {
     /// Stops the engines before their memory is freed. A channel that cannot be stopped keeps its
-    /// memory.
+    /// memory. In a forked child nothing but memory of its own is freed.
     fn drop(&mut self) {
-        if self.dead {
+        if self.dead || !self.process.is_this() {
             return;
         }
         if let Err(error) = self.platform.reach() {

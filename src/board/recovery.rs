@@ -56,7 +56,7 @@ impl Device {
 
     /// Stops the step in flight, if its caller has forgotten it.
     pub(crate) fn abandon(&mut self, shapes: &[Shape]) {
-        if self.in_flight() && !self.dead {
+        if self.in_flight() && !self.dead && self.process.is_this() {
             log::warn!("a step was not waited for: resetting the board");
             if let Err(error) = self.recover(shapes) {
                 self.give_up(&error);
@@ -64,8 +64,18 @@ impl Device {
         }
     }
 
+    /// Refuses a call in a child that the opener of the board has forked. The child's copy of this
+    /// state and the parent's would drive the same registers.
+    pub(crate) fn check_process(&self) -> Result<(), Error> {
+        match self.process.is_this() {
+            true => Ok(()),
+            false => Err(Error::OtherProcess { opener: self.process.id() }),
+        }
+    }
+
     /// Makes sure that the board is idle: a forgotten step is stopped first.
     pub(crate) fn settle(&mut self, shapes: &[Shape]) -> Result<(), Error> {
+        self.check_process()?;
         self.abandon(shapes);
         if self.dead { Err(Error::MustReopen) } else { Ok(()) }
     }

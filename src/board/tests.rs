@@ -124,6 +124,7 @@ fn a_board_in_use_is_busy_until_it_is_closed() {
     let first = find_in(&system, &uio("pgs"), &memory).expect("opened");
     let error = error_of(&uio("pgs"), &system);
     assert!(matches!(error, OpenError::Platform(PlatformError::Busy { .. })), "{error}");
+    assert!(error.to_string().contains("Two worlds on one board"), "{error}");
     drop(first);
     find_in(&system, &uio("pgs"), &memory).expect("opened");
 }

@@ -354,7 +354,8 @@ pub enum PlatformError {
     },
     /// Another user holds the lock of a device file.
     #[error(
-        "{} is locked: another program, or another part of this one, uses it; end that first",
+        "{} is locked: another program, or another accelerator of this one, uses it; end that first, or \
+         share it: one accelerator steps several worlds in turn (docs/library.md, Two worlds on one board)",
         path.display()
     )]
     Busy {
@@ -442,7 +443,11 @@ pub enum PlatformError {
         source: std::io::Error,
     },
     /// Another driver has the served board.
-    #[error("the board served at {} has another driver: end that first", socket.display())]
+    #[error(
+        "the board served at {} has another driver: end that first, or share it: one accelerator steps \
+         several worlds in turn (docs/library.md, Two worlds on one board)",
+        socket.display()
+    )]
     ServerBusy {
         /// The socket.
         socket: PathBuf,

@@ -1,8 +1,8 @@
 //! Bodies, and the trait that makes a caller's own arrays bodies.
 //!
-//! A step reads bodies and writes them back through [`Bodies`]. `[Body]` and `Vec<Body>` implement
-//! it (array of structures), [`BodyArrays`] implements it over separate arrays, and an engine with
-//! a layout of its own implements its two methods: nothing is copied in between.
+//! A step reads bodies and writes them back through [`Bodies`]. Slices, arrays and vectors of [`Body`]
+//! implement it, [`BodyArrays`] implements it over separate arrays, and an engine with a layout of its
+//! own implements its two methods: nothing is copied in between.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -120,6 +120,50 @@ impl Bodies for Vec<Body> {
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
         self.as_mut_slice().commit(index, pose, velocity);
+    }
+}
+
+impl<const N: usize> Bodies for [Body; N] {
+    fn len(&self) -> usize {
+        N
+    }
+
+    fn body(&self, index: usize) -> Body {
+        self[index]
+    }
+
+    fn structures(&self) -> Option<&[Body]> {
+        Some(self)
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        self.as_mut_slice().commit(index, pose, velocity);
+    }
+}
+
+impl<B: Bodies + ?Sized> Bodies for &mut B {
+    fn len(&self) -> usize {
+        B::len(self)
+    }
+
+    fn body(&self, index: usize) -> Body {
+        B::body(self, index)
+    }
+
+    fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
+        B::commit(self, index, pose, velocity);
+    }
+
+    fn structures(&self) -> Option<&[Body]> {
+        B::structures(self)
+    }
+
+    fn is_empty(&self) -> bool {
+        B::is_empty(self)
+    }
+
+    fn lengths_agree(&self) -> bool {
+        B::lengths_agree(self)
     }
 }
 

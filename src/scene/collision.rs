@@ -108,8 +108,8 @@ impl Collision {
 
 /// The collisions of a step, in the caller's own layout.
 ///
-/// `[Collision]` and `Vec<Collision>` implement it, [`CollisionArrays`] implements it over separate
-/// arrays. The solver takes the collisions in the order of
+/// Slices, arrays and vectors of [`Collision`] implement it, [`CollisionArrays`] implements it over
+/// separate arrays, and so does a reference to any of them. The solver takes the collisions in the order of
 /// [`StepParameters::order`](crate::StepParameters::order).
 ///
 /// Several threads may call it at the same time, each for collisions of its own
@@ -190,6 +190,52 @@ impl Collisions for Vec<Collision> {
 
     fn structures(&self) -> Option<Structures<'_>> {
         Some(Structures::Array(self))
+    }
+}
+
+impl<const N: usize> Collisions for [Collision; N] {
+    fn len(&self) -> usize {
+        N
+    }
+
+    #[inline]
+    fn collision(&self, index: usize) -> Collision {
+        self[index]
+    }
+
+    fn structures(&self) -> Option<Structures<'_>> {
+        Some(Structures::Array(self))
+    }
+}
+
+impl<C: Collisions + ?Sized> Collisions for &C {
+    fn len(&self) -> usize {
+        C::len(self)
+    }
+
+    #[inline]
+    fn collision(&self, index: usize) -> Collision {
+        C::collision(self, index)
+    }
+
+    fn structures(&self) -> Option<Structures<'_>> {
+        C::structures(self)
+    }
+
+    fn prefetch(&self, index: usize) {
+        C::prefetch(self, index);
+    }
+
+    fn is_empty(&self) -> bool {
+        C::is_empty(self)
+    }
+
+    fn lengths_agree(&self) -> bool {
+        C::lengths_agree(self)
+    }
+
+    fn impulses(&self, index: usize) -> Impulses {
+        C::impulses(self, index)
     }
 }
 

@@ -36,7 +36,8 @@ pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
 
 /// An open accelerator.
 ///
-/// Dropping it stops the DMA channels and frees their memory.
+/// Dropping it stops the DMA channels and frees their memory. It belongs to the process that opened it:
+/// in a forked child its calls are refused, and dropping it frees memory of the child alone.
 pub struct Accelerator {
     board: BoardDescription,
     pub(super) device: Device,
@@ -168,7 +169,8 @@ impl Accelerator {
     /// # Errors
     /// [`Error::Input`]: the input was refused and nothing was sent. [`Error::Step`]: a fault of
     /// the board; [`Error::may_retry`] and [`Error::must_reopen`] say what to do.
-    /// [`Error::MustReopen`] after a fault that could not be cleared.
+    /// [`Error::MustReopen`] after a fault that could not be cleared. [`Error::OtherProcess`] in a child
+    /// that was forked since the opening; so of every call.
     pub fn step<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &mut B,

@@ -71,7 +71,9 @@ impl Accelerator {
     /// [`Error::Input`] with [`InputError::NotInFlight`]: another call has stopped the step, or it
     /// is a step of another accelerator; a step that is in flight goes on. [`Error::MustReopen`] if
     /// the board was given up since.
+    /// [`Error::OtherProcess`] in a forked child.
     pub fn attach(&mut self, step: Detached) -> Result<InFlight<'_>, Error> {
+        self.device.check_process()?;
         let Detached { id, flight } = step;
         if self.detached != Some(id) {
             return Err(match self.device.dead {

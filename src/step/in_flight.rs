@@ -99,6 +99,7 @@ impl<'a> InFlight<'a> {
 
     /// Waits for the board, and takes the buffers of the step back.
     pub(super) fn collect<B: Bodies + ?Sized>(&mut self, bodies: &B) -> Result<Ended, Error> {
+        self.accelerator.device.check_process()?;
         let (found, expected) = (bodies.len(), self.flight.step.bodies);
         if found != expected {
             let Accelerator { device, shapes, .. } = &mut *self.accelerator;

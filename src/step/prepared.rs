@@ -61,8 +61,8 @@ impl InFlight<'_> {
     /// let none: [Collision; 0] = [];
     /// let parameters = StepParameters::default();
     ///
-    /// let mut flight = board.submit(&left, &none[..], &parameters)?;
-    /// let prepared = flight.prepare(&right, &none[..], &parameters)?;
+    /// let mut flight = board.submit(&left, &none, &parameters)?;
+    /// let prepared = flight.prepare(&right, &none, &parameters)?;
     /// let (report, started) = flight.wait_and_start(&mut left, &prepared);
     /// assert_eq!(report?.bodies, 2);
     /// assert_eq!(started?.wait(&mut right)?.bodies, 3);
@@ -87,6 +87,7 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard(|| {
             let accelerator = &mut *self.accelerator;
+            accelerator.device.check_process()?;
             let into = (self.flight.step.bank.other(), Engines::Working);
             let mut watch = Stopwatch::start();
             let step = accelerator.pack(into, bodies, collisions, parameters, &mut watch)?;

@@ -169,6 +169,7 @@ impl InFlight<'_> {
     ) -> Result<Prepared, Error> {
         standard_around(|caller| {
             let narrow_phase = |writer: &mut Writer<'_>| caller.run(|| narrow_phase(writer));
+            self.accelerator.device.check_process()?;
             let into = (self.flight.step.bank.other(), Engines::Working);
             let step =
                 self.accelerator.pack_written(into, bodies, announced, parameters, narrow_phase)?;

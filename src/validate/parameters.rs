@@ -29,7 +29,12 @@ pub(crate) fn check_parameters(
     let StepParameters { friction, angular_damping, spin_damping, .. } = *parameters;
     let share = |value: f32| (0.0..=1.0).contains(&value);
     let checks = [
-        (TIME_STEP, time_step, positive(time_step), "a finite number of seconds above 0"),
+        (
+            TIME_STEP,
+            time_step,
+            positive(time_step),
+            "a finite number of seconds, at least 1.1754944e-38",
+        ),
         ("position drift", position_drift, finite(position_drift), "a finite number of metres"),
         (
             "position coefficient",
@@ -129,6 +134,20 @@ mod tests {
             set(&mut parameters, *value);
             assert_eq!(checked(&parameters), Ok(()), "{value}");
         }
+    }
+
+    #[test]
+    fn the_refusal_of_a_time_step_names_the_smallest() {
+        let refused = |time_step| {
+            let parameters = StepParameters { time_step, ..StepParameters::default() };
+            checked(&parameters).map_err(|error| error.to_string())
+        };
+        let smallest = format!("{:e}", f32::MIN_POSITIVE);
+        for time_step in [0.0, 1e-38, -1.0] {
+            let error = refused(time_step).expect_err("too small");
+            assert!(error.contains(&format!("at least {smallest}")), "{error}");
+        }
+        assert_eq!(refused(f32::MIN_POSITIVE), Ok(()));
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod check;
 mod empty;
 mod extensions;
 mod float_environment;
+mod forked;
 mod interface;
 mod landing;
 mod order;

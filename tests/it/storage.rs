@@ -5,7 +5,7 @@
 use crate::common;
 use bitstream_model::BoardConfig;
 use scene::{Scene, SceneOptions};
-use zynq_pgs::{BodyArrays, CollisionArrays, StepParameters};
+use zynq_pgs::{Bodies, BodyArrays, CollisionArrays, Collisions, Shape, StepParameters, Velocity};
 
 #[test]
 fn separate_arrays_give_the_bits_of_arrays_of_structures() {
@@ -59,4 +59,32 @@ fn separate_arrays_give_the_bits_of_arrays_of_structures() {
     }
     assert_ne!(common::bits(bodies), before, "the step moves bodies");
     assert_eq!(common::bits(&arrays), common::bits(bodies));
+}
+
+/// As a caller writes them: `&mut [body]`, `&[collision]`, and references that functions got.
+#[test]
+fn arrays_and_references_give_the_bits_of_slices() {
+    fn step<B: Bodies, C: Collisions>(
+        mut bodies: B,
+        collisions: C,
+        bits: impl Fn(&B) -> Vec<u32>,
+    ) -> Vec<u32> {
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
+        let (_board, mut board) = common::open_with(BoardConfig::default(), None, &shapes);
+        let none = StepParameters::default();
+        board.step(&mut bodies, &collisions, &none).expect("a step");
+        bits(&bodies)
+    }
+    let (all, collisions) =
+        common::row(2, 2.2, |x| Velocity { linear: [x, -1.0, 0.0], angular: [0.0; 3] });
+    let [a, b, c] = all[..] else { panic!("the ground and two cubes") };
+    let [one, two] = collisions[..] else { panic!("two collisions") };
+    let expected = step(all.clone(), collisions.clone(), |bodies| common::bits(bodies));
+    assert_ne!(expected, common::bits(&all));
+    assert_eq!(step([a, b, c], [one, two], |bodies| common::bits(bodies)), expected);
+    let mut bodies = all.clone();
+    assert_eq!(step(&mut bodies[..], &collisions[..], |bodies| common::bits(bodies)), expected);
+    let given = &collisions;
+    assert!(given.structures().is_some() && [a].structures().is_some());
+    assert_eq!((Bodies::len(&[a, b]), Collisions::len(&&[one, two])), (2, 2));
 }

@@ -20,11 +20,14 @@
 //! `bitstream-model/rtl/simulator/main.cpp` is the other end, and `serve.rs` the same in Rust.
 
 use std::io::{self, Read, Write};
+use std::mem::{self, ManuallyDrop};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
+
+use pgs_support::Process;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards, Subnormals};
@@ -59,6 +62,8 @@ const CHUNK: usize = 1 << 16;
 #[derive(Debug)]
 pub struct SimulatorProcess {
     child: Child,
+    /// The process that has started it.
+    starter: Process,
     requests: Option<ChildStdin>,
     answers: Receiver<io::Result<Vec<u8>>>,
     /// Bytes that have come and were not read.
@@ -140,7 +145,9 @@ impl SimulatorProcess {
                 }
             });
         }
-        let mut process = Self { child, requests, answers, rest: Vec::new(), deadline: DEADLINE };
+        let starter = Process::this();
+        let (rest, deadline) = (Vec::new(), DEADLINE);
+        let mut process = Self { child, starter, requests, answers, rest, deadline };
         let expected = IDENTIFICATION_VALUE;
         match process.read(IDENTIFICATION.offset)? {
             found if found == expected => Ok(process),
@@ -267,6 +274,13 @@ impl Drop for SimulatorProcess {
     /// Closes its standard input and kills it: it has nothing left to do.
     fn drop(&mut self) {
         drop(self.requests.take());
+        if !self.starter.is_this() {
+            // A forked child: the simulator goes on for the parent, whose reading thread may have had
+            // a lock of the channel.
+            let (_, none) = mpsc::sync_channel(0);
+            let _ = ManuallyDrop::new(mem::replace(&mut self.answers, none));
+            return;
+        }
         // Ended or not: the kill of a process that has ended does nothing.
         let _ = self.child.kill();
         let _ = self.child.wait();

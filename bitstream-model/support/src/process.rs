@@ -2,8 +2,8 @@
 
 /// The process that made a value.
 ///
-/// A forked child has a copy of the value, but none of the threads, and it shares files, locks and
-/// sockets with its parent. What reaches outside of its own memory must not act there.
+/// A forked child has a copy of the value, but no thread of the parent's, and it shares files, locks and
+/// sockets with its parent. Code that reaches outside of its own memory must not act there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Process(u32);
 
@@ -53,7 +53,7 @@ pub fn in_forked_child(work: impl FnOnce() -> u8) -> Option<u8> {
     assert!(child >= 0, "no child: {}", std::io::Error::last_os_error());
     if child == 0 {
         alarm(60);
-        // The stack and the exit handlers are those of the parent's test.
+        // Without the exit handlers of the parent's test.
         _exit(catch_unwind(AssertUnwindSafe(work)).map_or(101, i32::from));
     }
     let mut status = 0_i32;

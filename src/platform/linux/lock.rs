@@ -6,11 +6,10 @@
 //! exists, which makes it the only mapping of its memory. The lock binds only programs that ask for
 //! it, and a second device file of the same device (`mknod`) has a lock of its own.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use nix::errno::Errno;
-use nix::fcntl::{Flock, FlockArg};
+use pgs_support::Process;
 
 use super::system::open_device;
 use crate::platform::PlatformError;
@@ -18,8 +17,9 @@ use crate::platform::PlatformError;
 /// An open device file with its lock, which is released on drop.
 #[derive(Debug)]
 pub(crate) struct LockedFile {
-    file: Flock<File>,
+    file: File,
     path: PathBuf,
+    process: Process,
     /// Other device files that show the same memory, locked for the same time.
     others: Vec<LockedFile>,
 }
@@ -35,10 +35,12 @@ impl LockedFile {
     /// Locks an open file.
     pub(crate) fn of_file(file: File, path: &Path) -> Result<Self, PlatformError> {
         let path = path.to_owned();
-        match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
-            Ok(file) => Ok(Self { file, path, others: Vec::new() }),
-            Err((_, Errno::EWOULDBLOCK)) => Err(PlatformError::Busy { path }),
-            Err((_, errno)) => Err(PlatformError::File { act: "lock", path, source: errno.into() }),
+        match file.try_lock() {
+            Ok(()) => Ok(Self { file, path, process: Process::this(), others: Vec::new() }),
+            Err(TryLockError::WouldBlock) => Err(PlatformError::Busy { path }),
+            Err(TryLockError::Error(source)) => {
+                Err(PlatformError::File { act: "lock", path, source })
+            }
         }
     }
 
@@ -56,6 +58,17 @@ impl LockedFile {
     /// Where it lies.
     pub(crate) fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+impl Drop for LockedFile {
+    /// Unlocks at once, although a forked child may still have the file open. In such a child, which
+    /// shares the lock, it only closes the file: the lock stays with the parent.
+    fn drop(&mut self) {
+        if self.process.is_this() {
+            // Closing the file unlocks it as well.
+            let _ = self.file.unlock();
+        }
     }
 }
 
@@ -137,6 +150,21 @@ mod tests {
         assert_busy(&other);
         drop(both);
         assert_free(&other);
+    }
+
+    /// The lock belongs to the opening, which a forked child shares: an unlock there would unlock here.
+    #[test]
+    fn a_forked_child_that_drops_a_lock_leaves_it_to_its_parent() {
+        let (_root, path) = device();
+        let mut held = Some(LockedFile::open(&path, 0).expect("free"));
+        let in_child = || {
+            drop(held.take());
+            7
+        };
+        assert_eq!(pgs_support::in_forked_child(in_child), Some(7));
+        assert_busy(&path);
+        drop(held);
+        assert_free(&path);
     }
 
     /// `flock(1)` is another program that asks for the same lock.

@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use pgs_interface::fence::Fence;
 use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_support::Process;
 
 use crate::platform::{
     Access, DmaMemory, Platform, PlatformError, SharedMemory, acquire_from_device,
@@ -93,6 +94,7 @@ struct Allocation {
     address: u64,
     bytes: u64,
     owner: Owner,
+    process: Process,
 }
 
 impl Allocation {
@@ -102,8 +104,9 @@ impl Allocation {
         bytes: u64,
         reach: Reach,
     ) -> Result<Self, PlatformError> {
-        let this = Self { platform: Arc::clone(platform), address, bytes, owner: Owner::Cpu };
-        reach.check(platform.memory().name(), address, bytes)?;
+        let platform = Arc::clone(platform);
+        let this = Self { platform, address, bytes, owner: Owner::Cpu, process: Process::this() };
+        reach.check(this.platform.memory().name(), address, bytes)?;
         Ok(this)
     }
 
@@ -117,6 +120,10 @@ impl Allocation {
 
 impl Drop for Allocation {
     fn drop(&mut self) {
+        if !self.process.is_this() {
+            // A forked child: the board's memory is its parent's, and a lock on it may be held.
+            return;
+        }
         let Self { address, bytes, .. } = *self;
         match self.owner {
             Owner::Cpu => {

@@ -1,11 +1,17 @@
 /* zynq_pgs.h: the C interface of zynq-pgs, driver of an FPGA accelerator for rigid body contacts.
  *
- * cbindgen makes this header from tools/capi/src. docs/c.md has the conventions.
+ * cbindgen makes this header from tools/capi/src. docs/c.md has the conventions. It needs C99 or C++11.
  *
  * - A call returns a zpgs_status; the words of a failure are in zpgs_last_error.
  * - A structure that begins with `size` has sizeof of itself there.
- * - One thread at a time uses an accelerator, but for zpgs_cancel.
+ * - One thread at a time uses an accelerator, but for zpgs_cancel. A forked child does not.
  */
+
+#if defined(__STRICT_ANSI__) && !defined(__cplusplus)
+#if !defined(__STDC_VERSION__) || __STDC_VERSION__ < 199901L
+#error "zynq_pgs.h needs C99 or newer: compile with -std=c99"
+#endif
+#endif
 
 #ifndef ZYNQ_PGS_H
 #define ZYNQ_PGS_H
@@ -50,6 +56,9 @@ typedef enum zpgs_status {
     // The library met a mistake of its own: close the accelerator. Every later call with the same
     // accelerator ends like this, too.
     ZPGS_STATUS_PANIC = 11,
+    // The call came from a child that was forked since `zpgs_open`: the accelerator is its parent's, and
+    // nothing was done. Open one after the fork. `zpgs_close` frees memory of the child alone.
+    ZPGS_STATUS_FORKED = 12,
 } zpgs_status;
 
 // The order in which the board gets the collisions.
@@ -155,8 +164,9 @@ typedef struct zpgs_strided_const {
 // The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
 // frame.
 //
-// During a call no other thread writes the arrays. No two elements share a byte, whether they are
-// of one array or of two.
+// During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
+// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with another
+// of its arguments. Elements of several arrays may alternate, as those of an array of structures do.
 typedef struct zpgs_bodies {
     // Size of the structure, as the caller's header has it.
     size_t size;
@@ -176,7 +186,7 @@ typedef struct zpgs_bodies {
 
 // The collisions of a step, in the caller's own memory.
 //
-// During a call no thread writes them, and they share no byte with the arrays of the bodies.
+// During a call no thread writes them. A step refuses them where they share a byte with the bodies.
 typedef struct zpgs_collisions {
     // Size of the structure, as the caller's header has it.
     size_t size;
@@ -269,7 +279,8 @@ uint32_t zpgs_abi_version(void);
 // `accelerator` is null or the address of a pointer that no other thread uses during the call.
 enum zpgs_status zpgs_open(const char *board, struct zpgs_accelerator **accelerator);
 
-// Closes an accelerator, and stops a step in flight. Null does nothing.
+// Closes an accelerator, and stops a step in flight. Null does nothing. In a child that was forked
+// since `zpgs_open` it frees memory of the child alone, and the parent's board goes on.
 //
 // # Safety
 // `accelerator` is null or from `zpgs_open`, is closed once, and no other thread uses it.
@@ -281,7 +292,8 @@ enum zpgs_status zpgs_close(struct zpgs_accelerator *accelerator);
 //
 // With null: the text of this thread's last failed call without an accelerator (`zpgs_open`, a
 // null handle), or with one that another thread used (`ZPGS_STATUS_BUSY`). It stays until the
-// thread's next call of this kind fails. Never null.
+// thread's next call of this kind fails. Never null. In a forked child this is the text with the
+// accelerator of its parent, too.
 //
 // # Safety
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns.

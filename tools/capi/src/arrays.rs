@@ -30,8 +30,9 @@ pub struct StridedConst {
 /// The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
 /// frame.
 ///
-/// During a call no other thread writes the arrays. No two elements share a byte, whether they are
-/// of one array or of two.
+/// During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
+/// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with another
+/// of its arguments. Elements of several arrays may alternate, as those of an array of structures do.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyArrays {
@@ -53,7 +54,7 @@ pub struct BodyArrays {
 
 /// The collisions of a step, in the caller's own memory.
 ///
-/// During a call no thread writes them, and they share no byte with the arrays of the bodies.
+/// During a call no thread writes them. A step refuses them where they share a byte with the bodies.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct CollisionArray {

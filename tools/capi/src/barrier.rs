@@ -34,8 +34,8 @@ pub(crate) fn call_with(
         return Status::Ok;
     };
     match status {
-        // The text of the accelerator is that of the other call.
-        Status::Busy => last_error::set(text),
+        // The text of the accelerator is that of the other call, or the parent's.
+        Status::Busy | Status::Forked => last_error::set(text),
         _ => handle.note(Failure { status, text }),
     }
     status

@@ -16,7 +16,7 @@ use crate::collision::{Collision, Impulses, count_with_friction};
 use crate::failure::Failure;
 use crate::handle::AcceleratorHandle;
 use crate::last_error;
-use crate::memory::{self, BodiesView, CollisionsView, Out};
+use crate::memory::{self, BodiesView, CollisionsView, Out, Span};
 use crate::parameters::Parameters;
 use crate::report::Report;
 use crate::shape::Shape;
@@ -69,7 +69,8 @@ pub unsafe extern "C" fn zpgs_open(
     call(|| unsafe { memory::open_into(accelerator, open) })
 }
 
-/// Closes an accelerator, and stops a step in flight. Null does nothing.
+/// Closes an accelerator, and stops a step in flight. Null does nothing. In a child that was forked
+/// since `zpgs_open` it frees memory of the child alone, and the parent's board goes on.
 ///
 /// # Safety
 /// `accelerator` is null or from `zpgs_open`, is closed once, and no other thread uses it.
@@ -86,7 +87,8 @@ pub unsafe extern "C" fn zpgs_close(accelerator: *mut AcceleratorHandle) -> Stat
 ///
 /// With null: the text of this thread's last failed call without an accelerator (`zpgs_open`, a
 /// null handle), or with one that another thread used (`ZPGS_STATUS_BUSY`). It stays until the
-/// thread's next call of this kind fails. Never null.
+/// thread's next call of this kind fails. Never null. In a forked child this is the text with the
+/// accelerator of its parent, too.
 ///
 /// # Safety
 /// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
@@ -177,12 +179,19 @@ pub unsafe extern "C" fn zpgs_step(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
+        let structures = [
+            Span::of("zpgs_bodies", bodies),
+            Span::of("zpgs_collisions", collisions),
+            Span::of("zpgs_parameters", parameters),
+        ];
         // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
         // call alone uses the bodies, and no thread writes the others.
         let (mut bodies, collisions, parameters) =
             unsafe { read_input(bodies, collisions, parameters) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
+        let inputs = structures.into_iter().chain(collisions.inputs());
+        outputs_apart(&bodies, report.as_ref(), None, inputs)?;
         let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
@@ -232,11 +241,13 @@ pub unsafe extern "C" fn zpgs_wait(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
+        let structure = [Span::of("zpgs_bodies", bodies)];
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
         // and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
+        outputs_apart(&bodies, report.as_ref(), None, structure.into_iter())?;
         let done = state.wait(&mut bodies)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
@@ -285,9 +296,22 @@ pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> S
     call(|| {
         // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
         // returns: `# Safety` of this function.
-        unsafe { memory::handle(accelerator) }?.cancel();
-        Ok(())
+        unsafe { memory::handle(accelerator) }?.cancel()
     })
+}
+
+/// Refuses a call whose outputs, the bodies among them, share bytes with each other or with its input.
+pub(crate) fn outputs_apart(
+    bodies: &BodiesView,
+    report: Option<&Out<Report>>,
+    started: Option<Span>,
+    inputs: impl Iterator<Item = Span> + Clone,
+) -> Result<(), Failure> {
+    let none = Span::of::<u8>("", std::ptr::null());
+    let [positions, orientations, linear, angular] = bodies.outputs();
+    let report = report.map_or(none, Out::span);
+    let outputs = [positions, orientations, linear, angular, report, started.unwrap_or(none)];
+    memory::refuse_overlap(&outputs, inputs.chain([bodies.input()]))
 }
 
 /// Refuses a warm start without impulses, which would be a cold one that takes longer.

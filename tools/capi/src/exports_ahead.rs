@@ -4,9 +4,9 @@
 
 use crate::arrays::{BodyArrays, CollisionArray};
 use crate::barrier::call_with;
-use crate::exports::{read_bodies, read_input};
+use crate::exports::{outputs_apart, read_bodies, read_input};
 use crate::handle::AcceleratorHandle;
-use crate::memory::{self, Out};
+use crate::memory::{self, Out, Span};
 use crate::parameters::Parameters;
 use crate::report::Report;
 use crate::status::Status;
@@ -62,13 +62,19 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
     let handle = unsafe { memory::handle(accelerator) };
     let mut start_failed = None;
     let status = call_with(handle, |state| {
-        // SAFETY: `started` is null or leads to a status that this call alone uses.
-        unsafe { memory::store(started, "status of the start", Status::Sequence) }?;
+        let structure = [Span::of("zpgs_bodies", bodies)];
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
         // and this call alone uses them.
-        let mut bodies = unsafe { read_bodies(bodies) }?;
+        let bodies = unsafe { read_bodies(bodies) };
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
-        let report = unsafe { Out::<Report>::optional(report) }?;
+        let report = unsafe { Out::<Report>::optional(report) };
+        if let (Ok(bodies), Ok(report)) = (&bodies, &report) {
+            let started = Span::of("status of the start", started);
+            outputs_apart(bodies, report.as_ref(), Some(started), structure.into_iter())?;
+        }
+        // SAFETY: `started` is null or leads to a status that this call alone uses.
+        unsafe { memory::store(started, "status of the start", Status::Sequence) }?;
+        let (mut bodies, report) = (bodies?, report?);
         let (done, start) = state.wait_and_start(&mut bodies)?;
         let status = start.as_ref().err().map_or(Status::Ok, |failure| failure.status);
         start_failed = start.err();

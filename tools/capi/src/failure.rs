@@ -39,8 +39,10 @@ impl From<Error> for Failure {
 
 /// The status of an error of the driver.
 fn status(error: &Error) -> Status {
+    if matches!(error, Error::OtherProcess { .. }) {
+        Status::Forked
     // A board that is lost is lost, also where a cancellation was the cause.
-    if error.must_reopen() {
+    } else if error.must_reopen() {
         Status::Reopen
     } else if matches!(error.fault(), Some(Fault::Cancelled)) {
         Status::Cancelled
@@ -91,6 +93,7 @@ mod tests {
         assert_eq!(status(Fault::Cancelled, Ready), Status::Cancelled);
         assert_eq!(status(Fault::Cancelled, MustReopen), Status::Reopen);
         assert_eq!(Failure::from(Error::MustReopen).status, Status::Reopen);
+        assert_eq!(Failure::from(Error::OtherProcess { opener: 1 }).status, Status::Forked);
         assert_eq!(Failure::from(Error::Input(InputError::NoShapes)).status, Status::Input);
     }
 

@@ -3,13 +3,14 @@
 use std::ffi::{CStr, CString, c_char};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
+use pgs_support::Process;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, Impulses,
     OpenOptions, Prepared, StepParameters, StepReport,
 };
 
 use crate::failure::Failure;
-use crate::last_error::c_string;
+use crate::last_error::{self, c_string};
 use crate::pushed::{List, Pushed};
 use crate::status::Status;
 
@@ -23,6 +24,8 @@ pub struct AcceleratorHandle {
     cancellation: Cancellation,
     /// The text of the last call that failed.
     text: Mutex<CString>,
+    /// The process that has opened it.
+    process: Process,
 }
 
 /// The accelerator, and its step in flight.
@@ -43,11 +46,21 @@ impl AcceleratorHandle {
         accelerator.set_cancellation(cancellation.clone());
         let (ticket, prepared, pushed) = (None, None, Pushed::default());
         let state = Mutex::new(State { accelerator, ticket, prepared, pushed });
-        Ok(Self { state, cancellation, text: Mutex::default() })
+        Ok(Self { state, cancellation, text: Mutex::default(), process: Process::this() })
+    }
+
+    /// Refuses a call in a child that was forked since the opening. It takes no lock: a thread of the
+    /// parent may have had it at the fork.
+    fn check_process(&self) -> Result<(), Failure> {
+        match self.process.is_this() {
+            true => Ok(()),
+            false => Err(Error::OtherProcess { opener: self.process.id() }.into()),
+        }
     }
 
     /// The state, for one call.
     pub(crate) fn lock(&self) -> Result<MutexGuard<'_, State>, Failure> {
+        self.check_process()?;
         let (status, text) = match self.state.try_lock() {
             Ok(state) => return Ok(state),
             Err(TryLockError::WouldBlock) => {
@@ -62,8 +75,10 @@ impl AcceleratorHandle {
     }
 
     /// Ends the step in flight, or else the next one.
-    pub(crate) fn cancel(&self) {
+    pub(crate) fn cancel(&self) -> Result<(), Failure> {
+        self.check_process()?;
         self.cancellation.cancel();
+        Ok(())
     }
 
     /// Keeps the text of a failure; a cancellation that is reported ends no other step.
@@ -74,8 +89,12 @@ impl AcceleratorHandle {
         *self.text.lock().unwrap_or_else(PoisonError::into_inner) = c_string(failure.text);
     }
 
-    /// The text of the last failed call; it stays until another call fails.
+    /// The text of the last failed call; it stays until another call fails. In a forked child it is
+    /// the thread's.
     pub(crate) fn text(&self) -> *const c_char {
+        if !self.process.is_this() {
+            return last_error::get();
+        }
         let text = self.text.lock().unwrap_or_else(PoisonError::into_inner);
         CStr::as_ptr(&text)
     }

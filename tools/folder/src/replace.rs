@@ -4,9 +4,13 @@
 //! complete and on the disk do they get their names, one after the other. If a step of this fails,
 //! the earlier files get their names back. A process that is killed in between leaves temporary
 //! files (`.pgs-...`), and every name with either its earlier or its new content.
+//!
+//! A new file has the owner, the group and the mode of the earlier one, as far as the file system and the
+//! caller's rights allow it: a result is not lost because they cannot be set.
 
-use std::fs::{self, File, OpenOptions, Permissions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
+use std::os::unix::fs::{MetadataExt as _, fchown};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -78,20 +82,20 @@ impl Replacement {
         path: &Path,
         write: impl FnOnce(&mut File) -> io::Result<()>,
     ) -> io::Result<()> {
-        let (target, permissions) = match destination(path)? {
+        let (target, earlier) = match destination(path)? {
             Destination::Stream(mut stream) => return write(&mut stream),
             Destination::Nothing => (path.to_path_buf(), None),
-            Destination::File(path, permissions) => (path, Some(permissions)),
+            Destination::File(path, metadata) => (path, Some(metadata)),
         };
         let (mut file, temporary) = temporary(&target)?;
         // From here on a failure removes the temporary file.
         self.files.push(Staged { target, temporary: Some(temporary.clone()), earlier: None });
         write(&mut file)?;
-        if let Some(permissions) = permissions {
-            fs::set_permissions(&temporary, permissions)?;
+        if let Some(earlier) = earlier {
+            make_like(&file, &earlier);
         }
-        // Some file systems report a full disk only here.
-        file.sync_all()
+        // Some file systems report a full disk only here, and some cannot do it at all.
+        file.sync_all().or_else(|error| if is_lost(&error) { Err(error) } else { Ok(()) })
     }
 
     /// Gives every file its name.
@@ -178,12 +182,40 @@ fn keep(path: &Path) -> io::Result<PathBuf> {
     Ok(kept)
 }
 
+/// Gives a file the owner, the group and the mode of an earlier one. Where that cannot be, as on a FAT
+/// file system or without the rights, it keeps its own.
+fn make_like(file: &File, earlier: &Metadata) {
+    let found = file.metadata().map(|metadata| (metadata.uid(), metadata.gid())).ok();
+    if found != Some((earlier.uid(), earlier.gid())) {
+        // Whoever may not give a file away may still give it to a group of his.
+        let _ = fchown(file, Some(earlier.uid()), Some(earlier.gid()))
+            .or_else(|_| fchown(file, None, Some(earlier.gid())));
+    }
+    // After the owner, whose change takes bits of the mode away.
+    let _ = file.set_permissions(earlier.permissions());
+}
+
+/// Whether an error of `fsync` says that data did not reach the disk. Every other one says that the file
+/// system, or a sandbox, has no such call.
+fn is_lost(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull
+            | io::ErrorKind::QuotaExceeded
+            | io::ErrorKind::FileTooLarge
+            | io::ErrorKind::StaleNetworkFileHandle
+    ) || error.raw_os_error() == Some(EIO)
+}
+
+/// The number of the kernel's input/output error, which has no kind of its own.
+const EIO: i32 = 5;
+
 /// The target of a write.
 enum Destination {
     /// A free name.
     Nothing,
     /// A regular file, behind all links.
-    File(PathBuf, Permissions),
+    File(PathBuf, Metadata),
     /// A device or a pipe.
     Stream(File),
 }
@@ -200,7 +232,7 @@ fn destination(path: &Path) -> io::Result<Destination> {
     if !metadata.is_file() {
         return Ok(Destination::Stream(file));
     }
-    Ok(Destination::File(fs::canonicalize(path)?, metadata.permissions()))
+    Ok(Destination::File(fs::canonicalize(path)?, metadata))
 }
 
 /// Makes a new file in the folder of `beside`.
@@ -238,6 +270,7 @@ fn folder_of(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs::Permissions;
     use std::io::Write as _;
     use tempfile::TempDir;
 
@@ -346,5 +379,22 @@ mod tests {
         assert_eq!(fs::read_to_string(&target).expect("there"), "new");
         assert_eq!(fs::metadata(&target).expect("there").permissions().mode() & 0o777, 0o640);
         assert_eq!((content(folder.path()).len(), content(elsewhere.path()).len()), (3, 2));
+    }
+
+    /// Root that replaces a user's file leaves it to the user.
+    #[test]
+    fn the_owner_of_a_file_stays() {
+        use std::os::unix::fs::{PermissionsExt, chown};
+        let folder = earlier();
+        let path = folder.path().join("a");
+        if chown(&path, Some(1234), Some(1235)).is_err() {
+            let _ = writeln!(io::stderr(), "skipped: another owner (not root)");
+            return;
+        }
+        fs::set_permissions(&path, Permissions::from_mode(0o4640)).expect("owned");
+        replace(&path, |file| file.write_all(b"new")).expect("replaced");
+        let found = fs::metadata(&path).expect("there");
+        assert_eq!((found.uid(), found.gid(), found.mode() & 0o7777), (1234, 1235, 0o4640));
+        assert_eq!(fs::read_to_string(&path).expect("there"), "new");
     }
 }

@@ -14,6 +14,7 @@ use crate::diagnosis;
 use crate::failure::Failure;
 use crate::options::ordering;
 use crate::output::SCHEMA;
+use crate::output::files::Named;
 
 /// The arguments for a failed step.
 #[derive(Debug, Clone, Default, Args)]
@@ -33,6 +34,11 @@ impl FaultArgs {
     pub(crate) fn apply(&self, mut parameters: StepParameters) -> StepParameters {
         parameters.retries = self.retries;
         parameters
+    }
+
+    /// The file of the report, to be told from every other file of the command.
+    pub(crate) fn named(&self) -> Option<Named> {
+        self.report.as_ref().map(|path| Named::option("report", path))
     }
 
     /// Makes a failure of a step's error, and writes the report if the command line names one.

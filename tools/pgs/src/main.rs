@@ -35,6 +35,7 @@ mod verbs;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread;
 
 use signal_hook::consts::SIGXFSZ;
 use signal_hook::flag;
@@ -60,7 +61,22 @@ fn survive_file_limit() {
     }
 }
 
+/// Bytes of the stack of the command, whatever the limit of the system is (`ulimit -s`).
+const STACK: usize = 8 << 20;
+
 fn main() -> ExitCode {
+    // Named as the system's first thread, whose name stands in the message of a panic.
+    let command = thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(run);
+    match command {
+        // The message of a panic is out already.
+        Ok(command) => command.join().unwrap_or(ExitCode::from(101)),
+        // The system gives no thread: its own stack may do.
+        Err(_) => run(),
+    }
+}
+
+/// Runs the command of the command line.
+fn run() -> ExitCode {
     log_to_stderr();
     survive_file_limit();
     #[cfg(feature = "pages")]

@@ -12,9 +12,9 @@ use step_trace::TracedStep;
 use zynq_pgs::{BoardKind, StepReport};
 
 use crate::board::OpenBoard;
-use crate::failure::{Cause, Failure};
+use crate::failure::Failure;
 use crate::options::build::described;
-use crate::output::files::check_folder;
+use crate::output::files::{Named, check_folder, unwritten};
 
 /// The files that show the inside of a step.
 #[derive(Debug, Clone, Default, Args)]
@@ -56,6 +56,11 @@ impl TracedArgs {
     fn given(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let all = [("vcd", &self.vcd), ("trace", &self.trace), ("timeline", &self.timeline)];
         all.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?)))
+    }
+
+    /// The files, to be told from every other file of the command.
+    pub(crate) fn named(&self) -> impl Iterator<Item = Named> {
+        self.given().map(|(name, path)| Named::option(name, path))
     }
 
     /// Whether a step is to be recorded.
@@ -138,10 +143,7 @@ impl Tracing<'_> {
                 out.flush()
             })
         });
-        written.and_then(|()| files.commit()).map_err(|error| {
-            Failure::new(Cause::Output, error)
-                .next("make room, or name another file; no file has changed")
-        })
+        written.and_then(|()| files.commit()).map_err(unwritten)
     }
 }
 

@@ -53,16 +53,21 @@ pub fn build(design: &Design, folder: &Path, waveform: Waveform) -> Result<PathB
 pub fn build_files(files: &[File], folder: &Path, waveform: Waveform) -> Result<PathBuf, Error> {
     verilator::require("a simulator of the accelerator")?;
     write(folder, files)?;
-    fs::write(folder.join("main.cpp"), MAIN).map_err(Error::io("write the simulator's program"))?;
+    let elsewhere = if verilator::takes(folder)? { None } else { Some(verilator::place()?) };
+    let place = elsewhere.as_ref().map_or(folder, |elsewhere| elsewhere.path());
+    if elsewhere.is_some() {
+        write(place, files)?;
+    }
+    fs::write(place.join("main.cpp"), MAIN).map_err(Error::io("write the simulator's program"))?;
     let modules = files.iter().filter(|file| file.name.ends_with(".v"));
     let mut names: Vec<String> = modules.map(|file| file.name.clone()).collect();
     names.push("main.cpp".into());
     // The simulation is hardly faster with -O2, and the build takes four times as long.
     let waveform = waveform == Waveform::Vcd;
     let build = verilator::Build { top: emit::TOP, flags: "-O1", files: &names, waveform };
-    verilator::build(folder, &build)?;
+    verilator::build(place, &build)?;
     let program = folder.join(PROGRAM);
-    fs::copy(folder.join("obj").join(format!("V{}", emit::TOP)), &program)
+    fs::copy(place.join("obj").join(format!("V{}", emit::TOP)), &program)
         .map_err(Error::io("copy the simulator"))?;
     Ok(program)
 }

@@ -7,10 +7,12 @@
 
 #![allow(unsafe_code, reason = "the memory of a C caller is reached by raw pointers alone")]
 
+mod overlap;
 mod pointer;
 mod sized;
 mod view;
 
+pub(crate) use overlap::{Span, refuse_overlap};
 pub(crate) use pointer::{close, handle, open_into, slice, store, text};
 pub(crate) use sized::{Out, read};
 pub(crate) use view::{BodiesView, CollisionsView, store_impulses};

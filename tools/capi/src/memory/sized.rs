@@ -4,9 +4,11 @@
 //! have their defaults. A caller with a newer header has a larger one: the bytes behind the known
 //! fields must be zero, which asks for nothing.
 
+use std::mem::offset_of;
 use std::ptr::{self, NonNull};
 use std::slice;
 
+use super::overlap::Span;
 use super::pointer::checked;
 use crate::arrays::{BodyArrays, CollisionArray};
 use crate::failure::Failure;
@@ -24,39 +26,47 @@ const LARGEST: usize = 4096;
 pub(crate) unsafe trait Growing: Copy {
     /// Its name in messages.
     const NAME: &'static str;
+    /// Its size in the first header that had it: no caller has a smaller one.
+    const FIRST: usize;
 }
 
 // SAFETY: `repr(C)`, a `usize` and 20 numbers of 32 bits.
 unsafe impl Growing for Parameters {
     const NAME: &'static str = "zpgs_parameters";
+    const FIRST: usize = offset_of!(Self, warm_start);
 }
 const _: () = assert!(size_of::<Parameters>() == size_of::<usize>() + 20 * 4);
 
 // SAFETY: `repr(C)`, a `usize` and 9 numbers of 64 bits.
 unsafe impl Growing for Report {
     const NAME: &'static str = "zpgs_report";
+    const FIRST: usize = size_of::<Self>();
 }
 const _: () = assert!(size_of::<Report>() == size_of::<usize>() + 9 * 8);
 
 // SAFETY: `repr(C)`, two `usize` and five pairs of a raw pointer and a `usize`.
 unsafe impl Growing for BodyArrays {
     const NAME: &'static str = "zpgs_bodies";
+    const FIRST: usize = size_of::<Self>();
 }
 const _: () = assert!(size_of::<BodyArrays>() == 12 * size_of::<usize>());
 
 // SAFETY: `repr(C)`, two `usize` and two pairs of a raw pointer and a `usize`.
 unsafe impl Growing for CollisionArray {
     const NAME: &'static str = "zpgs_collisions";
+    const FIRST: usize = offset_of!(Self, impulses);
 }
 const _: () = assert!(size_of::<CollisionArray>() == 6 * size_of::<usize>());
 
 /// Checks the size that a caller gives.
 fn check_size<T: Growing>(size: usize) -> Result<(), Failure> {
-    if (size_of::<usize>()..=LARGEST).contains(&size) && size.is_multiple_of(align_of::<T>()) {
+    if (T::FIRST..=LARGEST).contains(&size) && size.is_multiple_of(align_of::<T>()) {
         return Ok(());
     }
-    let name = T::NAME;
-    Err(Failure::argument(format!("found {size} as the size of {name}: set it to sizeof({name})")))
+    let (name, first) = (T::NAME, T::FIRST);
+    Err(Failure::argument(format!(
+        "found {size} as the size of {name}, which has {first} bytes or more: set it to sizeof({name})"
+    )))
 }
 
 /// The size in the first field of a structure, checked.
@@ -131,6 +141,11 @@ impl<T: Growing> Out<T> {
         Ok(Self { pointer, size })
     }
 
+    /// Its bytes.
+    pub(crate) fn span(&self) -> Span {
+        Span::of(T::NAME, self.pointer.as_ptr()).of_size(self.size)
+    }
+
     /// Writes the fields that the caller's structure has, its size as it is, and zeros behind the
     /// known fields.
     pub(crate) fn write(self, value: T) {
@@ -167,14 +182,34 @@ mod tests {
 
     #[test]
     fn an_older_structure_has_the_defaults_of_the_fields_that_it_lacks() {
-        let mut older = [0_u64; 4];
-        older[0] = 32;
-        // SAFETY: 32 bytes, as the first field says.
-        let read = unsafe { read(older.as_ptr().cast(), Parameters::default()) };
+        let known = Parameters {
+            size: Parameters::FIRST,
+            retries: 3,
+            warm_start: 1,
+            ..Parameters::default()
+        };
+        // SAFETY: more bytes than the first field says.
+        let read = unsafe { read(&raw const known, Parameters::default()) };
         let read = read.expect("an older structure");
-        assert_eq!((read.size, read.spin_damping.to_bits(), read.time_step.to_bits()), (32, 0, 0));
-        assert_eq!(read.gravity.map(f32::to_bits), Parameters::default().gravity.map(f32::to_bits));
-        assert_eq!(read.contact_iterations, 4);
+        assert_eq!((read.size, read.retries, read.warm_start), (80, 3, 0));
+    }
+
+    #[test]
+    fn a_structure_smaller_than_its_first_version_is_refused_by_name() {
+        fn refused<T: Growing>(first: usize) {
+            assert_eq!(check_size::<T>(first), Ok(()));
+            for size in (0..first).step_by(4) {
+                let refused = check_size::<T>(size).expect_err("too small");
+                let name = T::NAME;
+                assert_eq!(refused.status, crate::status::Status::Argument);
+                assert!(refused.text.contains(&format!("found {size} as the size of {name}")));
+                assert!(refused.text.contains(&format!("sizeof({name})")), "{}", refused.text);
+            }
+        }
+        refused::<Parameters>(80);
+        refused::<Report>(80);
+        refused::<BodyArrays>(96);
+        refused::<CollisionArray>(32);
     }
 
     #[test]
@@ -187,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_size_that_no_header_has_is_refused() {
-        for size in [0, 4, 12, 4104, usize::MAX] {
+        for size in [0, 4, 84, 4104, usize::MAX] {
             let known = Parameters { size, ..Parameters::default() };
             let refused = read_newer(&Newer { known, field: 0 }).expect_err("refused");
             assert!(refused.text.contains("sizeof(zpgs_parameters)"), "{}", refused.text);
@@ -196,11 +231,11 @@ mod tests {
 
     #[test]
     fn what_is_written_ends_where_the_callers_structure_ends() {
-        let mut older = [u64::MAX; 4];
-        // SAFETY: 24 bytes of 32.
-        let out = unsafe { Out::<Report>::of_size(older.as_mut_ptr().cast(), 24) };
-        out.expect("a size").write(Report { cycles: 7, stalls: 8, waits: 9, ..Report::default() });
-        assert_eq!(older, [24, 7, 8, u64::MAX]);
+        let mut older = [u64::MAX; 12];
+        // SAFETY: 80 bytes of 96.
+        let out = unsafe { Out::<Parameters>::of_size(older.as_mut_ptr().cast(), 80) };
+        out.expect("a size").write(Parameters { retries: 7, ..Parameters::default() });
+        assert_eq!((older[0], older[9] >> 32, older[10], older[11]), (80, 7, u64::MAX, u64::MAX));
 
         let mut newer = [u64::MAX; 12];
         // SAFETY: 88 bytes of 96.

@@ -5,6 +5,7 @@ use std::slice;
 
 use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Pose, Structures, Velocity};
 
+use super::overlap::Span;
 use super::pointer::{extent, misaligned};
 use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
 use crate::failure::Failure;
@@ -15,6 +16,7 @@ use crate::failure::Failure;
 /// stride is aligned and leads to an element in the caller's memory.
 #[derive(Debug)]
 struct Column<T> {
+    name: &'static str,
     first: NonNull<T>,
     stride: usize,
 }
@@ -25,10 +27,10 @@ impl<T: Copy> Column<T> {
     /// # Safety
     /// `data` is null or leads to `count` elements, `stride` bytes apart, which live as long as the
     /// column is in use. Every bit pattern is a `T`.
-    unsafe fn new(data: StridedConst, count: usize, name: &str) -> Result<Self, Failure> {
+    unsafe fn new(data: StridedConst, count: usize, name: &'static str) -> Result<Self, Failure> {
         let StridedConst { data, stride } = data;
         if count == 0 {
-            return Ok(Self { first: NonNull::dangling(), stride: 0 });
+            return Ok(Self { name, first: NonNull::dangling(), stride: 0 });
         }
         let first = NonNull::new(data.cast_mut()).ok_or_else(|| Failure::null(name))?.cast::<T>();
         if !first.is_aligned() {
@@ -42,7 +44,12 @@ impl<T: Copy> Column<T> {
             )));
         }
         extent(first.addr().get(), stride, size_of::<T>(), count, name)?;
-        Ok(Self { first, stride })
+        Ok(Self { name, first, stride })
+    }
+
+    /// Its bytes.
+    fn span(&self, count: usize) -> Span {
+        Span::new::<T>(self.name, self.first.addr().get(), self.stride, count)
     }
 
     /// The address of an element.
@@ -123,6 +130,23 @@ impl BodiesView {
         Ok(Self { count, positions, orientations, linear_velocities, angular_velocities, shapes })
     }
 
+    /// The arrays that a step writes.
+    pub(crate) fn outputs(&self) -> [Span; 4] {
+        let Self { count, positions, orientations, linear_velocities, angular_velocities, .. } =
+            self;
+        [
+            positions.span(*count),
+            orientations.span(*count),
+            linear_velocities.span(*count),
+            angular_velocities.span(*count),
+        ]
+    }
+
+    /// The array that a step only reads.
+    pub(crate) fn input(&self) -> Span {
+        self.shapes.span(self.count)
+    }
+
     /// Makes sure that an index is below the count, as the driver promises.
     fn check(&self, index: usize) {
         assert!(index < self.count, "body {index} of {}", self.count);
@@ -200,6 +224,13 @@ impl CollisionsView<'_> {
             false => Some(unsafe { Column::new(impulses, count, "impulses") }?),
         };
         Ok(Self { count, column, dense, impulses })
+    }
+
+    /// The arrays.
+    pub(crate) fn inputs(&self) -> [Span; 2] {
+        let none = || Span::of::<Impulses>("impulses", std::ptr::null());
+        let impulses = self.impulses.as_ref().map_or_else(none, |column| column.span(self.count));
+        [self.column.span(self.count), impulses]
     }
 
     /// Whether a step can begin with the impulses of every collision.

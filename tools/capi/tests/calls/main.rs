@@ -10,6 +10,7 @@ macro_rules! made {
     };
 }
 
+mod forked;
 mod in_flight;
 mod pushed;
 mod refusals;

@@ -1,6 +1,6 @@
 //! Wrong arguments and wrong input are refused by status and name, and change nothing.
 
-use std::ptr::{null, null_mut};
+use std::ptr::{from_ref, null, null_mut};
 
 use zynq_pgs_c::*;
 
@@ -106,4 +106,81 @@ fn an_array_that_is_misaligned_or_too_large_or_overlaps_itself_is_refused() {
     ));
     assert_eq!(status, Status::Argument, "a report without a size");
     assert_eq!(crates, world());
+}
+
+#[test]
+fn outputs_that_share_bytes_are_refused_and_alternating_arrays_are_not() {
+    let (open, mut crates) = (Open::new("emulated:float"), world());
+    let all = [collision(), collision()];
+    let (bodies, given, parameters) = (arrays(&mut crates), collisions(&all), defaults());
+    let mut report = Report { size: size_of::<Report>(), ..Report::default() };
+    let step = |bodies: &BodyArrays, all: &CollisionArray, report: *mut Report| {
+        let status = made!(zpgs_step(
+            open.0,
+            from_ref(bodies),
+            from_ref(all),
+            &raw const parameters,
+            report
+        ));
+        (status, open.text())
+    };
+    let refused = |(status, text): (Status, String), one: &str, other: &str| {
+        assert_eq!(status, Status::Argument, "{one}, {other}");
+        assert!(text.contains(&format!("the {one} and the {other} share bytes")), "{text}");
+    };
+    let none = null_mut();
+    let same = BodyArrays { angular_velocities: bodies.linear_velocities, ..bodies };
+    refused(step(&same, &given, none), "linear velocities", "angular velocities");
+    // The last element of one in the first of the other.
+    let mut shifted = bodies;
+    shifted.positions.data = bodies.orientations.data.wrapping_byte_add(size_of::<Crate>());
+    refused(step(&shifted, &given, none), "positions", "orientations");
+    let mut dense = bodies;
+    dense.orientations = Strided { data: crates.as_mut_ptr().cast(), stride: 16 };
+    refused(step(&dense, &given, none), "orientations", "angular velocities");
+    let own_shapes = StridedConst { data: bodies.positions.data, stride: bodies.positions.stride };
+    refused(
+        step(&BodyArrays { shapes: own_shapes, ..bodies }, &given, none),
+        "positions",
+        "shapes of the bodies",
+    );
+    let mut inside = given;
+    inside.collisions.data = crates.as_ptr().cast();
+    inside.count = 1;
+    refused(step(&bodies, &inside, none), "positions", "collisions");
+    let mut warm = given;
+    warm.impulses = StridedConst { data: bodies.linear_velocities.data, stride: 24 };
+    refused(step(&bodies, &warm, none), "positions", "impulses");
+    let mut apart = bodies;
+    apart.positions = Strided { data: (&raw mut report.cycles).cast(), stride: 12 };
+    refused(step(&apart, &given, &raw mut report), "positions", "zpgs_report");
+    refused(
+        step(&bodies, &given, (&raw const parameters).cast_mut().cast()),
+        "zpgs_report",
+        "zpgs_parameters",
+    );
+    assert_eq!(crates, world());
+
+    // Inputs may lie over each other, and a call that only reads takes any bodies.
+    let mut over = given;
+    over.impulses = StridedConst { data: all.as_ptr().cast(), stride: 24 };
+    let (status, text) = step(&bodies, &over, &raw mut report);
+    assert_eq!((status, report.bodies), (Status::Ok, 2), "{text}");
+    let mut crates = world();
+    let bodies = arrays(&mut crates);
+    let same = BodyArrays { angular_velocities: bodies.linear_velocities, ..bodies };
+    let resting = BodyArrays { count: 1, ..same };
+    assert_eq!(open.submit(&resting, &collisions(&[])), Status::Ok, "{}", open.text());
+    assert_eq!(open.wait(&resting), Status::Argument);
+    let mut started = Status::Ok;
+    let ahead = |bodies: &BodyArrays, report: *mut Report, started: *mut Status| {
+        made!(zpgs_wait_and_start(open.0, from_ref(bodies), report, started))
+    };
+    assert_eq!(ahead(&resting, null_mut(), &raw mut started), Status::Argument);
+    assert!(open.text().contains("angular velocities"), "{}", open.text());
+    let over = bodies.positions.data.cast();
+    assert_eq!(ahead(&bodies, null_mut(), over), Status::Argument);
+    assert!(open.text().contains("status of the start"), "{}", open.text());
+    assert_eq!(crates, world());
+    assert_eq!(open.wait(&BodyArrays { count: 1, ..bodies }), Status::Ok, "still in flight");
 }

@@ -43,6 +43,18 @@ impl Example {
         can
     }
 
+    /// Reads the header as a program of that standard; the compiler's messages, if it refuses.
+    pub(crate) fn messages(self, standard: &str) -> Result<(), String> {
+        let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/zynq_pgs.h");
+        let mut compiler = Command::new(self.compiler());
+        compiler.args([standard, "-fsyntax-only", "-x", "c"]).arg(header);
+        let made = compiler.output().expect("the compiler runs");
+        match made.status.success() {
+            true => Ok(()),
+            false => Err(String::from_utf8_lossy(&made.stderr).into_owned()),
+        }
+    }
+
     /// Compiles the example, and returns the digest that it prints.
     pub(crate) fn digest(self, folder: &Path, name: &str, libraries: &[OsString]) -> String {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -94,3 +94,16 @@ fn the_c_example_gives_the_drivers_bits_with_the_static_and_the_shared_library()
 fn the_cpp_example_gives_the_drivers_bits_with_the_static_and_the_shared_library() {
     compare(TOWER, scenes::tower);
 }
+
+#[test]
+fn a_compiler_of_older_c_is_told_what_the_header_needs() {
+    if !CUBE.can_compile() {
+        return;
+    }
+    let refused = |standard: &str| CUBE.messages(standard);
+    let found = refused("-std=c89").expect_err("too old");
+    assert!(found.contains("needs C99 or newer"), "{found}");
+    for standard in ["-std=c99", "-std=gnu89", "-std=c11"] {
+        refused(standard).expect(standard);
+    }
+}

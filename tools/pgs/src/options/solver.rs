@@ -77,6 +77,8 @@ fn share(text: &str) -> Result<f32, String> {
 
 /// Longest time step, s. A longer one is a typing error.
 const TIME_STEP_MAX: f32 = 1.0;
+/// Shortest time step, s: the board computes its reciprocal, which is infinite for a subnormal number.
+const TIME_STEP_MIN: f32 = f32::MIN_POSITIVE;
 
 /// Parses a time step.
 fn time_step(text: &str) -> Result<f32, String> {
@@ -86,8 +88,10 @@ fn time_step(text: &str) -> Result<f32, String> {
         None => number(text),
     };
     match seconds {
-        Some(seconds) if seconds > 0.0 && seconds <= TIME_STEP_MAX => Ok(seconds),
-        _ => Err(format!("expected seconds above 0 and up to {TIME_STEP_MAX}, as 0.02 or 1/60")),
+        Some(seconds) if (TIME_STEP_MIN..=TIME_STEP_MAX).contains(&seconds) => Ok(seconds),
+        _ => Err(format!(
+            "expected seconds from {TIME_STEP_MIN:e} to {TIME_STEP_MAX}, as 0.02 or 1/60"
+        )),
     }
 }
 
@@ -108,8 +112,12 @@ mod tests {
         let bits = |text: &str| time_step(text).map(f32::to_bits);
         assert_eq!(bits("1/60"), Ok(StepParameters::default().time_step.to_bits()));
         assert_eq!(bits("0.02"), Ok(0.02_f32.to_bits()));
-        for wrong in ["", "0", "-1", "1/0", "0/1", "2", "nan", "inf", "1/60 s", "1//60"] {
-            time_step(wrong).expect_err(wrong);
+        assert_eq!(bits("1.1754944e-38"), Ok(f32::MIN_POSITIVE.to_bits()));
+        let wrong =
+            ["", "0", "-1", "1/0", "0/1", "2", "nan", "inf", "1/60 s", "1//60", "1e-38", "1e-60"];
+        for wrong in wrong {
+            let error = time_step(wrong).expect_err(wrong);
+            assert!(error.contains("from 1.1754944e-38 to 1"), "{error}");
         }
     }
 

@@ -21,6 +21,7 @@ use crate::options::planned::PlannedArgs;
 use crate::options::solver::{DeadlineArgs, SolverArgs};
 use crate::output::SCHEMA;
 use crate::output::facts::fact;
+use crate::output::files::{Files, Named, unwritten};
 use crate::output::order;
 use crate::output::{limit_text, milliseconds};
 use crate::permutation::{self, Permutation};
@@ -118,6 +119,16 @@ impl SolveArgs {
         self.faults.apply(self.deadline.apply(self.solver.apply(parameters)))
     }
 
+    /// The files that the command writes and reads. The expected results are read to compare alone.
+    fn files(&self, common: &CommonArgs) -> Files {
+        let out = self.out.iter().flat_map(|folder| {
+            State::ALL.into_iter().map(move |state| Named::option("out", folder.join(state.file())))
+        });
+        let outputs = out.chain(self.traced.named()).chain(self.faults.named());
+        let unread = |name: &str| !self.compare && name.starts_with("out_");
+        Files::of(common).write(outputs).read_folder(&self.folder, unread)
+    }
+
     /// Sets the order in which the board gets the collisions.
     fn ordered(&self, parameters: StepParameters, capabilities: &Capabilities) -> StepParameters {
         match self.compare {
@@ -147,6 +158,7 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    args.files(common).check()?;
     let mut folder = step_input::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
     let expected = match args.compare {
@@ -208,12 +220,7 @@ pub(crate) fn run(
     // A step that failed is told before a file that cannot be written.
     let inside = traced.transpose()?.unwrap_or_default();
     if let Some(path) = &args.out {
-        folder::write_results(path, &bodies).map_err(|error| {
-            Failure::input(error).next(format!(
-                "make room, or give another folder with --out; {} is unchanged",
-                path.display()
-            ))
-        })?;
+        folder::write_results(path, &bodies).map_err(unwritten)?;
     }
 
     let beside_bullet = match args.compare {

@@ -61,6 +61,25 @@ fn a_cell_can_be_replayed_from_its_line() {
 }
 
 #[test]
+fn a_list_of_cells_for_programs_is_a_document_with_the_lines_for_people() {
+    let list = |more: &[&str]| pgs(&[&["faults", "--list", "--profile", "naive"], more].concat());
+    let found = document(&list(&["--json"]));
+    let profiles = found["profiles"].as_array().expect("profiles");
+    let lines: Vec<String> = profiles
+        .iter()
+        .flat_map(|of| {
+            of["cells"].as_array().expect("cells").iter().map(|cell| (&of["profile"], cell))
+        })
+        .map(|(name, cell)| {
+            assert!(cell["kind"].is_string() && cell["phase"].is_string(), "{cell}");
+            format!("{:12} {}", name.as_str().expect("text"), cell["fault"].as_str().expect("text"))
+        })
+        .collect();
+    let text = String::from_utf8(list(&[]).stdout).expect("text");
+    assert!(lines.len() > 500 && lines.iter().eq(text.lines()), "{text}");
+}
+
+#[test]
 fn a_fault_that_is_survived_changes_nothing_and_one_that_is_not_is_taken_again() {
     let plain = document(&run(&["--json"]));
     for (fault, retries) in [("irq-drop,n=2", 0), ("stall@dma1.mm2s,step=2", 1)] {

@@ -42,7 +42,7 @@ fn results_that_cannot_be_written_leave_the_earlier_ones() {
     let ran = on_a_full_disk(&["solve", text(&large), "--out", text(&out)]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("cannot be written"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("is unchanged"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("has not changed"), "{}", ran.stderr);
     assert_eq!(content(&out), before);
 
     // Folders made for the results are removed.
@@ -104,4 +104,81 @@ fn a_report_may_go_to_a_device() {
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
     assert!(ran.stderr.contains("for a bug report, see /dev/null"), "{}", ran.stderr);
     assert!(!fs::metadata("/dev/null").expect("there").is_file());
+}
+
+/// Every file that a verb writes says what to do, not one option alone.
+#[test]
+fn every_file_that_finds_no_room_has_a_next_step() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| text(&folder.path().join(name)).to_owned();
+    let step = golden("pile5_step60");
+    let (run, solve) = (vec!["run", "--grid", "4x4x4", "--steps", "2"], vec!["solve", text(&step)]);
+    for (verb, option, name) in [
+        (&run, "--poses", "poses.npz"),
+        (&run, "--poses", "poses.glb"),
+        (&run, "--view", "page.html"),
+        (&run, "--picture", "last.svg"),
+        (&run, "--trace", "step.json"),
+        (&solve, "--vcd", "step.vcd"),
+        (&solve, "--timeline", "step.svg"),
+        (&solve, "--out", "results"),
+    ] {
+        let ran = on_a_full_disk(&[&verb[..], &[option, &at(name)]].concat());
+        assert_eq!(ran.code, Some(2), "{option}: {}", ran.stderr);
+        assert!(ran.stderr.contains("\n  next: make room, or "), "{option}: {}", ran.stderr);
+        assert!(content(folder.path()).is_empty(), "{option}");
+    }
+}
+
+#[test]
+fn an_output_that_is_another_output_or_an_input_is_refused_before_the_run() {
+    let folder = crate::common::copy("two_cubes");
+    let at = |name: &str| text(&folder.path().join(name)).to_owned();
+    let before = content(folder.path());
+    let out = at("");
+    let input = text(folder.path());
+    let (one, dotted) = (at("s.json"), at("./s.json"));
+    let (result, array) = (at("out_pos.npy"), at("body_pos.npy"));
+    let refused = |arguments: &[&str], names: [&str; 2]| {
+        let ran = run(arguments);
+        assert_eq!(ran.code, Some(2), "{arguments:?}: {}", ran.stderr);
+        for name in names {
+            assert!(ran.stderr.contains(name), "{arguments:?}: {}", ran.stderr);
+        }
+        assert!(ran.stderr.contains("are one file\n  next: name another file"), "{}", ran.stderr);
+        assert_eq!((ran.stdout.as_str(), content(folder.path()) == before), ("", true));
+    };
+    refused(&["solve", input, "--trace", &one, "--vcd", &dotted], ["--trace", "--vcd"]);
+    refused(&["solve", input, "--trace", &one, "--report", &one], ["--trace", "--report"]);
+    refused(&["solve", input, "--out", &out, "--vcd", &result], ["--out", "--vcd"]);
+    refused(&["solve", input, "--timeline", &array], ["--timeline", "the input"]);
+    refused(&["solve", input, "--compare", "--out", &out], ["--out", "the input"]);
+    let (page, scene) = (at("x.html"), ["run", "--grid", "2x2x2", "--steps", "1"]);
+    refused(&[&scene[..], &["--view", &page, "--trace", &page]].concat(), ["--view", "--trace"]);
+    let curve = at("live.csv");
+    std::os::unix::fs::symlink("body_pos.npy", &curve).expect("a link");
+    let ran = run(["order", "--input", input, "--curve", &curve]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("live.csv and the input "), "{}", ran.stderr);
+    fs::remove_file(&curve).expect("a link");
+
+    let null = "/dev/null";
+    let ran = run(["solve", input, "--trace", null, "--vcd", null, "--timeline", null]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    // The folder's expected results are no input unless they are compared.
+    assert_eq!(run(["solve", input, "--out", &out]).code, Some(0));
+}
+
+/// What a program prints and what it writes to the file behind stdout would destroy each other.
+#[test]
+fn an_output_that_is_the_file_of_stdout_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("all.json");
+    let file = fs::File::create(&path).expect("made");
+    let mut command = pgs();
+    command.args(["solve", text(&golden("two_cubes")), "--json", "--trace", text(&path)]);
+    let ran = command.stdout(file).output().expect("it runs");
+    assert_eq!(ran.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(said.contains("--trace") && said.contains("standard output"), "{said}");
 }

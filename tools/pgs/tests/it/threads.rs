@@ -59,3 +59,24 @@ fn every_command_does_with_fewer_threads() {
         }
     }
 }
+
+/// The system's own stack is as large as `ulimit -s` says, which may be less than parsing needs.
+#[test]
+fn a_command_needs_no_stack_of_the_systems() {
+    let cube = golden("one_cube").display().to_string();
+    let commands: [&[&str]; 4] = [
+        &["solve", &cube, "--digest"],
+        &["run", "--grid", "3x3x3", "--steps", "2", "--json"],
+        &["check", "--board", "emulated"],
+        &["--help"],
+    ];
+    for arguments in commands {
+        let command = pgs();
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "ulimit -s 64; exec \"$0\" \"$@\""]);
+        shell.arg(command.get_program()).args(command.get_args()).args(arguments);
+        shell.envs(command.get_envs().filter_map(|(name, value)| Some((name, value?))));
+        let ran: Ran = shell.output().expect("a shell").into();
+        assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
+    }
+}

@@ -1,6 +1,7 @@
 //! Checks of the hardware against references that share no code with it.
 
 use std::io;
+use std::path::PathBuf;
 use std::process::ExitStatus;
 
 pub mod operators;
@@ -30,6 +31,16 @@ pub enum Error {
         status: ExitStatus,
         /// Its messages and the compiler's.
         output: String,
+    },
+    /// The temporary folder has a path that `make` does not take.
+    #[error(
+        "Verilator's makefiles do not work in {}: set TMPDIR to a folder whose path has letters, digits \
+         and . _ - + , @ alone",
+        folder.display()
+    )]
+    Place {
+        /// The folder.
+        folder: PathBuf,
     },
     /// A file, a program or a pipe.
     #[error("cannot {act}")]

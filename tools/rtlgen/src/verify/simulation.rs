@@ -55,7 +55,7 @@ impl Simulator {
     pub fn build_from(operators: &[Source<'_>]) -> Result<Self, Error> {
         const PURPOSE: &str = "the simulation of the operators";
         verilator::require(PURPOSE)?;
-        let folder = TempDir::new().map_err(Error::io("make a temporary folder"))?;
+        let folder = verilator::place()?;
         let write = |file: &str, text: &str| {
             fs::write(folder.path().join(file), text).map_err(Error::io("write the sources"))
         };

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use tempfile::TempDir;
+
 use super::Error;
 
 /// A program to build from Verilog and C++.
@@ -37,7 +39,32 @@ pub fn require(purpose: &'static str) -> Result<(), Error> {
     }
 }
 
-/// Builds `obj/V<top>` in a folder. Warnings do not stop it: a seeded mistake may cause one.
+/// Whether Verilator's makefiles work in a folder: `make` takes spaces and some other characters of the
+/// path for its own.
+///
+/// # Errors
+///
+/// The folder does not exist.
+pub fn takes(folder: &Path) -> Result<bool, Error> {
+    let path = folder.canonicalize().map_err(Error::io("find the folder"))?;
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,@".contains(c);
+    Ok(path.to_str().is_some_and(|path| path.chars().all(plain)))
+}
+
+/// A temporary folder in which Verilator's makefiles work.
+///
+/// # Errors
+///
+/// [`Error::Place`] if there is none.
+pub fn place() -> Result<TempDir, Error> {
+    let folder = tempfile::tempdir().map_err(Error::io("make a temporary folder"))?;
+    match takes(folder.path())? {
+        true => Ok(folder),
+        false => Err(Error::Place { folder: folder.path().to_owned() }),
+    }
+}
+
+/// Builds `obj/V<top>` in a folder that [`takes`] it. Warnings do not stop it: a seeded mistake may cause one.
 ///
 /// # Errors
 ///
@@ -60,4 +87,30 @@ pub fn build(folder: &Path, build: &Build<'_>) -> Result<(), Error> {
     let text = [output.stdout, output.stderr].concat();
     let output_text = String::from_utf8_lossy(&text).into_owned();
     Err(Error::Build { status: output.status, output: output_text })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_folder_that_make_does_not_take_is_told_by_its_whole_path() {
+        let root = place().expect("a temporary folder without odd characters");
+        let within = |name: &str| {
+            let folder = root.path().join(name).join("sim");
+            fs::create_dir_all(&folder).expect("a folder");
+            takes(&folder).expect("it exists")
+        };
+        for odd in
+            ["my design", "a#b", "a$b", "a:b", "a%b", "it's", "(1)", "a&b", "a=b", "a;b", "a~"]
+        {
+            assert!(!within(odd), "{odd}");
+        }
+        for plain in ["design", "my-design_1.2", "a+b,c@d", "ü"] {
+            assert!(within(plain), "{plain}");
+        }
+        takes(&root.path().join("none")).expect_err("no such folder");
+    }
 }

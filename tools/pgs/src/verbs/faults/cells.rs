@@ -3,6 +3,7 @@
 use bitstream_model::{
     Direction, Fault, FaultKind, FaultPlan, PacketCount, Place, StepPhase, When,
 };
+use serde_json::{Value, json};
 
 use super::expected::{Expected, expected};
 use super::trial::Bench;
@@ -23,6 +24,12 @@ pub(super) struct Cell {
 impl Cell {
     pub(super) fn phase_text(&self) -> String {
         self.phase.map_or_else(|| "any".to_owned(), |phase| phase.to_string())
+    }
+
+    /// The fault for programs.
+    pub(super) fn to_json(&self) -> Value {
+        let (kind, phase) = (self.kind.name(), self.phase_text());
+        json!({ "fault": self.plan.to_string(), "kind": kind, "phase": phase })
     }
 
     /// The channel of the fault.

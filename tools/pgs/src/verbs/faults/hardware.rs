@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::cells::{self, Cell};
 use super::trial::{Bench, CellResult};
-use super::{FaultsArgs, try_all};
+use super::{FaultsArgs, list, try_all};
 use crate::board;
 use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
@@ -61,10 +61,7 @@ pub(super) fn run(
     let bench = Bench::like_simulator(profile)?;
     let cells = cells::for_simulator(&bench);
     if args.list {
-        for cell in &cells {
-            writeln!(out, "{:10} {}", profile.name, cell.plan)?;
-        }
-        return Ok(Verdict::Done);
+        return list(&[(profile.name.to_owned(), cells)], common, out);
     }
     // A simulator that cannot be used is refused here, with the reason, and not cell by cell.
     board::emulated_board(bench.config, &common.accelerator)?;

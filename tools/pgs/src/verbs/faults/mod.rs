@@ -82,7 +82,7 @@ pub(crate) fn run(
         Some(profile) => vec![profile],
         None => PROFILES.to_vec(),
     };
-    let mut all = Vec::new();
+    let (mut all, mut listed) = (Vec::new(), Vec::new());
     let starts = |profile: &'static Profile| {
         let warm = Extensions::possible(&profile.default_variant()).warm_start;
         [Start::Cold, Start::Warm].into_iter().filter(move |start| warm || *start == Start::Cold)
@@ -97,16 +97,14 @@ pub(crate) fn run(
             Start::Warm => format!("{}+warm", profile.name),
         };
         if args.list {
-            for cell in &cells {
-                writeln!(out, "{name:12} {}", cell.plan)?;
-            }
+            listed.push((name, cells));
             continue;
         }
         let cells = try_all(&bench, cells);
         all.push(ProfileResults { name, cells, impossible });
     }
     if args.list {
-        return Ok(Verdict::Done);
+        return list(&listed, common, out);
     }
     let failed = all.iter().flat_map(|tried| &tried.cells).any(|(_, found)| !found.passed());
     if common.json {
@@ -115,6 +113,30 @@ pub(crate) fn run(
         table::print(&all, out)?;
     }
     Ok(if failed { Verdict::Differs } else { Verdict::Done })
+}
+
+/// Prints the fault of each cell of each profile.
+fn list(
+    profiles: &[(String, Vec<Cell>)],
+    common: &CommonArgs,
+    out: &mut dyn Write,
+) -> Result<Verdict, Failure> {
+    if common.json {
+        let of_profile = |(name, cells): &(String, Vec<Cell>)| {
+            let cells: Vec<_> = cells.iter().map(Cell::to_json).collect();
+            json!({ "profile": name, "cells": cells })
+        };
+        let profiles: Vec<_> = profiles.iter().map(of_profile).collect();
+        let document = json!({ "schema": SCHEMA, "verb": "faults", "profiles": profiles });
+        writeln!(out, "{document:#}")?;
+        return Ok(Verdict::Done);
+    }
+    for (name, cells) in profiles {
+        for cell in cells {
+            writeln!(out, "{name:12} {}", cell.plan)?;
+        }
+    }
+    Ok(Verdict::Done)
 }
 
 /// Tries the cells on all processors, or with fewer threads if the system gives no more; the
@@ -149,15 +171,14 @@ fn to_json(all: &[ProfileResults]) -> Value {
                     "what": what.what,
                     "cells": what.cells,
                 })).collect::<Vec<_>>(),
-                "cells": cells.iter().map(|(cell, found)| json!({
-                    "fault": cell.plan.to_string(),
-                    "kind": cell.kind.name(),
-                    "phase": cell.phase_text(),
-                    "passed": found.passed(),
-                    "cause": found.cause,
-                    "elapsed_ms": found.elapsed.as_secs_f64() * 1e3,
-                    "wrong": found.failed_checks(),
-                })).collect::<Vec<_>>(),
+                "cells": cells.iter().map(|(cell, found)| {
+                    let mut document = cell.to_json();
+                    document["passed"] = found.passed().into();
+                    document["cause"] = found.cause.into();
+                    document["elapsed_ms"] = (found.elapsed.as_secs_f64() * 1e3).into();
+                    document["wrong"] = json!(found.failed_checks());
+                    document
+                }).collect::<Vec<_>>(),
             })
         })
         .collect();

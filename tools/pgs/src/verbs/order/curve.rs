@@ -12,7 +12,8 @@ use zynq_pgs::order::{IssueWindow, live_curve};
 
 use super::rows::Measured;
 use super::source::Source;
-use crate::failure::{Cause, Failure};
+use crate::failure::Failure;
+use crate::output::files::unwritten;
 
 /// Parses the path of a table or a picture, which its extension tells apart.
 pub(super) fn path(text: &str) -> Result<PathBuf, String> {
@@ -53,9 +54,7 @@ pub(super) fn write(
         Some(true) => picture(&curves, window),
         _ => table(&curves),
     };
-    replace(path, |file| file.write_all(text.as_bytes())).map_err(|error| {
-        Failure::new(Cause::Output, error).next("make room, or give another file with --curve")
-    })
+    replace(path, |file| file.write_all(text.as_bytes())).map_err(unwritten)
 }
 
 /// One line a slot, one column an order; empty where an order has no such slot.

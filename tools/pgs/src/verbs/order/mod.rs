@@ -17,6 +17,7 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 use crate::numbers::grouped;
 use crate::output::SCHEMA;
+use crate::output::files::{Files, Named};
 use crate::output::table::{Column, heading, line};
 use rows::{Measured, Row};
 use source::Source;
@@ -98,6 +99,12 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    let curve = args.curve.iter().map(|path| Named::option("curve", path));
+    let mut files = Files::of(common).write(curve);
+    if let Some(folder) = &args.input {
+        files = files.read_folder(folder, |_| false);
+    }
+    files.check()?;
     let source = Source::load(args, common)?;
     let windows = args
         .depth

@@ -4,11 +4,12 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use step_folder::replace::{ReplaceError, Replacement};
+use step_folder::replace::Replacement;
 
 use super::parts::Report;
 use super::{page, text};
 use crate::failure::{Cause, Failure};
+use crate::output::files::unwritten;
 
 /// The files beside the figures.
 const FILES: [&str; 3] = ["report.html", "report.md", "report.json"];
@@ -28,10 +29,6 @@ pub(super) fn check(folder: &Path) -> Result<(), Failure> {
         probe.stage(&path, |_| Ok(())).map_err(unwritten)?;
     }
     Ok(())
-}
-
-fn unwritten(error: ReplaceError) -> Failure {
-    Failure::new(Cause::Output, error).next("make room, or name another folder with --out")
 }
 
 /// Writes the report into a folder that [`check`] has made; the paths of the files.

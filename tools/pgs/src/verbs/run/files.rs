@@ -15,7 +15,7 @@ use zynq_pgs_view::{ViewError, gltf, npz};
 use super::film::{Film, Rhythm};
 use crate::failure::{Cause, Failure};
 use crate::numbers::grouped;
-use crate::output::files::check_folder;
+use crate::output::files::{Named, check_folder, unwritten};
 
 /// Most frames without a choice of the user's, beside the start.
 const FRAMES: u32 = 200;
@@ -106,12 +106,20 @@ impl Unfit {
 impl FileArgs {
     /// Refuses files that could not be written after the run.
     pub(super) fn check(&self) -> Result<(), Failure> {
-        self.paths().try_for_each(check_folder)
+        self.given().try_for_each(|(_, path)| check_folder(path))
     }
 
-    fn paths(&self) -> impl Iterator<Item = &Path> {
-        let poses = self.poses.as_ref().map(|poses| poses.path.as_path());
-        poses.into_iter().chain(self.view.as_deref()).chain(self.picture.as_deref())
+    /// The options that the command line has, with their files.
+    fn given(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
+        let poses = self.poses.as_ref().map(|poses| &poses.path);
+        let (view, picture) = (self.view.as_ref(), self.picture.as_ref());
+        let all = [("poses", poses), ("view", view), ("picture", picture)];
+        all.into_iter().filter_map(|(name, path)| Some((name, path?)))
+    }
+
+    /// The files, to be told from every other file of the command.
+    pub(super) fn named(&self) -> impl Iterator<Item = Named> {
+        self.given().map(|(name, path)| Named::option(name, path))
     }
 
     /// Begins to record a scene at its start; `None` if no file shows its course.
@@ -199,8 +207,7 @@ impl Written {
         what: String,
         mut document: Value,
     ) -> Result<Self, Failure> {
-        replace(path, |file| file.write_all(bytes))
-            .map_err(|error| Failure::new(Cause::Output, error))?;
+        replace(path, |file| file.write_all(bytes)).map_err(unwritten)?;
         document["path"] = path.display().to_string().into();
         document["bytes"] = bytes.len().into();
         let size = match bytes.len() {

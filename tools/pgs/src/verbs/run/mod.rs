@@ -34,6 +34,7 @@ use crate::options::planned::PlannedArgs;
 use crate::options::scenes::{CONTACT_REACH, SceneArgs};
 use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
 use crate::output::facts::fact;
+use crate::output::files::Files;
 use crate::output::order;
 use crate::output::progress::progress_bar;
 use crate::output::table::{Column, heading, line};
@@ -225,6 +226,8 @@ pub(crate) fn run(
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
     args.files.check()?;
+    let outputs = args.files.named().chain(args.traced.named()).chain(args.faults.named());
+    Files::of(common).write(outputs).check()?;
     let build = args.build.build();
     let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
