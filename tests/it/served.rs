@@ -37,16 +37,16 @@ fn scene(cubes: u16) -> (Vec<Body>, Vec<Collision>) {
 }
 
 /// A board served by another thread.
-struct Served {
+pub(crate) struct Served {
     folder: tempfile::TempDir,
-    board: EmulatedBoard,
+    pub(crate) board: EmulatedBoard,
     stopper: Stopper,
     visits: Receiver<Visit>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Served {
-    fn new(config: BoardConfig) -> Self {
+    pub(crate) fn new(config: BoardConfig) -> Self {
         Self::with(config, None)
     }
 
@@ -72,7 +72,7 @@ impl Served {
         at(&self.socket())
     }
 
-    fn open(&self) -> Accelerator {
+    pub(crate) fn open(&self) -> Accelerator {
         let mut accelerator = Accelerator::open(self.options()).expect("a board that opens");
         let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
         accelerator.set_shapes(&shapes).expect("shapes that fit");
@@ -84,7 +84,7 @@ impl Served {
         self.visits.recv().expect("a visit that ended")
     }
 
-    fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.stopper.stop();
         self.thread.take().expect("stopped once").join().expect("no panic");
     }
