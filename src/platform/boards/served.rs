@@ -456,7 +456,7 @@ mod tests {
                 1,
                 "seals SealFlag(F_SEAL_SHRINK | F_SEAL_GROW)",
             ),
-            (vec![memory(MEMORY_UNIT, SEALS - shrink | SealFlag::F_SEAL_SEAL)], 1, "F_SEAL_GROW"),
+            (vec![memory(MEMORY_UNIT, (SEALS - shrink) | SealFlag::F_SEAL_SEAL)], 1, "F_SEAL_GROW"),
             (vec![tempfile::tempfile().expect("a file")], 1, "found 0 bytes"),
         ];
         for (files, value, text) in cases {
