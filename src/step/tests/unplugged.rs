@@ -1,6 +1,7 @@
 //! Takes the logic away under an open driver: on hardware the next access to a register would hang
 //! the processor. The emulated board still answers, and counts the accesses.
 
+use std::mem::ManuallyDrop;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -82,7 +83,7 @@ fn a_step_in_flight_is_given_up() {
         None
     });
     unplug_in_flight(|flight| {
-        std::mem::forget(flight);
+        let _forgotten = ManuallyDrop::new(flight);
         None
     });
 }
