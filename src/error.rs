@@ -191,8 +191,8 @@ pub enum OpenError {
     Identity(#[from] IdentityError),
     /// The capabilities changed while the board was opened.
     #[error(
-        "the capabilities have changed while the board was opened: was another bitstream loaded, or \
-         the power lost? open it again, with nobody loading one"
+        "the capabilities have changed while the board was opened: was another bitstream loaded, \
+         or the power lost? open it again, with nobody loading one"
     )]
     OtherBitstream,
     /// A DMA core did not follow.

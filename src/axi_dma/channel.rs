@@ -94,7 +94,7 @@ impl Channel {
 
     /// Starts a halted channel at a descriptor, waits until it runs, and reads CURDESC back.
     ///
-    /// The logic may be loaded anew between any two accesses, and then has forgotten the address, or
+    /// The logic may be loaded anew between any two accesses, and has then forgotten the address or
     /// half of it. After this check it has the address, or RS is 0 since, and a doorbell starts
     /// nothing (PG021, DMACR bit 0: a reset clears it).
     pub(crate) fn start(

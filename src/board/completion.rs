@@ -236,7 +236,7 @@ impl Device {
         }
     }
 
-    /// Fails on the first status register that shows an error, or a channel that a reset has halted.
+    /// Fails on the first status register that shows an error, or that a reset has halted.
     fn check(&self, statuses: &Statuses) -> Result<(), Symptom> {
         for (place, (port, status)) in self.ports().zip(statuses).enumerate() {
             let halted = port.running() && status.halted();

@@ -17,8 +17,8 @@ use crate::platform::PlatformError;
 
 /// The cause of a failed step.
 ///
-/// Among several errors the fault is the one that explains the others. A board that is gone, another
-/// bitstream and a reset of the logic come first, then an error of a channel, an error of a
+/// Among several errors the fault is the one that explains the others. A board that is gone,
+/// another bitstream and a reset of the logic come first, then an error of a channel, an error of a
 /// descriptor, the accelerator's own error, a packet of a wrong length, and a deadline last.
 #[derive(Debug, Error)]
 #[non_exhaustive]

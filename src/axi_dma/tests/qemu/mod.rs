@@ -6,8 +6,8 @@
 //!
 //! It does less than PG021 says, so that these tests cannot judge: byte counts (a descriptor's stay
 //! 0), RXSOF and RXEOF of a packet in several descriptors (all have both), `SGIncld` (reads 0), a
-//! stop (`Halted` stays 0 when RS is cleared), CURDESC after a reset (it stays), a direction held up
-//! by the other, addresses above 32 bits.
+//! stop (`Halted` stays 0 when RS is cleared), CURDESC after a reset (it stays), a direction held
+//! up by the other, addresses above 32 bits.
 
 mod machine;
 mod platform;
