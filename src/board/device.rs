@@ -205,7 +205,7 @@ impl Device {
                 [(&mut self.mm2s[core], sent), (&mut self.s2mm[core], received)]
             {
                 if !port.ring_takes(descriptors) {
-                    self.platform.reach()?;
+                    self.platform.check_present()?;
                     port.stop(&*self.platform)?;
                     port.replace_ring(&self.platform, descriptors, reach)?;
                 }
@@ -255,7 +255,7 @@ impl Device {
         let largest = self.largest;
         let outline = Outline::new(plan, largest);
         // Comes before the step's first register.
-        self.platform.reach()?;
+        self.platform.check_present()?;
         self.started = Some(Started { outline, at: self.platform.now() });
         self.activity = Activity::Step;
         self.hand_over(plan, bank)?;
@@ -393,7 +393,7 @@ impl Drop for Device {
         if self.dead || !self.process.is_this() {
             return;
         }
-        if let Err(error) = self.platform.reach() {
+        if let Err(error) = self.platform.check_present() {
             self.give_up(&error.into());
             return;
         }

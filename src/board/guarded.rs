@@ -77,6 +77,7 @@ impl Device {
             Direction::S2mm => (&mut self.s2mm[core], plan.results(core)),
         };
         if master == Master::Sg {
+            self.platform.check_present()?;
             port.stop(&*self.platform)?;
             port.replace_ring(guard, descriptors, reach)?;
         } else {
@@ -94,7 +95,7 @@ impl Device {
         };
         if guarded.master != Master::Sg {
             port.drop_buffer(bank);
-        } else if port.stop(&*self.platform).is_ok() {
+        } else if self.platform.check_present().is_ok() && port.stop(&*self.platform).is_ok() {
             port.drop_ring();
         }
     }

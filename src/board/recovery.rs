@@ -115,7 +115,7 @@ impl Device {
     }
 
     fn clear(&mut self, shapes: &[Shape]) -> Result<(), Fault> {
-        self.platform.reach()?;
+        self.platform.check_present()?;
         self.reset()?;
         // Checked before the shapes are written and the board counts as ready.
         let found = self.control.fingerprint();

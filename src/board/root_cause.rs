@@ -25,7 +25,7 @@ impl Device {
         if matches!(symptom, Symptom::Known(Cancelled)) && !self.in_flight() {
             return (Cancelled, None);
         }
-        if let Err(error) = self.platform.reach() {
+        if let Err(error) = self.platform.check_present() {
             return (error.into(), None);
         }
         let seen = match symptom {

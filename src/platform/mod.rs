@@ -113,7 +113,7 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
         None
     }
     /// Makes sure that the registers may still be touched.
-    fn reach(&self) -> Result<(), PlatformError> {
+    fn check_present(&self) -> Result<(), PlatformError> {
         self.lost().map_or(Ok(()), Err)
     }
 }

@@ -142,7 +142,7 @@ impl Accelerator {
         standard(|| {
             self.settle()?;
             validate_shapes(shapes, &self.limits)?;
-            if let Err(error) = self.device.platform.reach() {
+            if let Err(error) = self.device.platform.check_present() {
                 return Err(self.device.fail(error.into(), &self.shapes));
             }
             self.device.load_shapes(shapes);

@@ -325,7 +325,7 @@ impl Platform for HardwarePlatform {
         }
         self.pause(timeout.min(WITHOUT_INTERRUPT));
         // Without an interrupt nothing else tells, while the caller looks at the registers.
-        self.reach().map(|()| None)
+        self.check_present().map(|()| None)
     }
 
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
@@ -337,7 +337,7 @@ impl Platform for HardwarePlatform {
     }
 
     /// Two system calls for one node, one for each further node.
-    fn reach(&self) -> Result<(), PlatformError> {
+    fn check_present(&self) -> Result<(), PlatformError> {
         self.lost().map_or(Ok(()), Err)?;
         self.ask().map_err(|error| self.noted(error))
     }
@@ -420,7 +420,7 @@ mod tests {
             kernel.write_all(&7_u32.to_ne_bytes()).expect("written");
             assert_eq!(platform.wait_interrupt(LONG).expect("there is one"), Some(7), "{way}");
             platform.unmask_interrupt().expect("written");
-            platform.reach().expect("written");
+            platform.check_present().expect("written");
             let mut words = [0; 8];
             kernel.read_exact(&mut words).expect("the unmasking, and the question before a step");
             assert_eq!(words, [1_u32.to_ne_bytes(); 2].concat()[..], "{way}");
@@ -438,7 +438,7 @@ mod tests {
             for _ in 0..3 {
                 assert_eq!(platform.wait_interrupt(LONG).expect("polling"), None, "{way}");
                 platform.unmask_interrupt().expect("nothing to do");
-                platform.reach().expect("it is there");
+                platform.check_present().expect("it is there");
             }
             assert!(platform.now() < LONG, "{way}: a wait is the pause of a poll");
         }
@@ -457,7 +457,7 @@ mod tests {
         };
         let window = platform.window(RegisterMap::Control).expect("mapped before");
         let before = word();
-        let error = platform.reach().expect_err(why);
+        let error = platform.check_present().expect_err(why);
         assert!(matches!(error, PlatformError::Lost { .. }), "{error}");
         assert!(error.to_string().contains(why), "{error}");
         assert_eq!(window.read32(0), u32::MAX);
@@ -508,7 +508,7 @@ mod tests {
                 let (device, at) = control_file(&system, way);
                 let at = usize::try_from(at).expect("a small file");
                 assert_eq!(fs::read(device).expect("read")[at..at + 4], [0; 4], "{way}");
-                platform.reach().expect_err("for good");
+                platform.check_present().expect_err("for good");
             }
         }
     }
@@ -524,7 +524,7 @@ mod tests {
         ] {
             let (_root, system) = system();
             let platform = board(&system, way, &ManagerChoice::Automatic);
-            platform.reach().expect("it is there");
+            platform.check_present().expect("it is there");
             fs::write(system.uio.join(format!("uio{node}/name")), "").expect("emptied");
             let (device, at) = control_file(&system, way);
             assert_lost(&platform, (&device, at), text);
@@ -548,10 +548,10 @@ mod tests {
                 for manager in [ManagerChoice::Unasked, ManagerChoice::Automatic] {
                     let (_root, system) = system();
                     let platform = board(&system, way, &manager);
-                    platform.reach().expect("it runs");
+                    platform.check_present().expect("it runs");
                     add_manager(&system, 0, ZYNQMP_MANAGER, state);
                     if manager == ManagerChoice::Unasked {
-                        platform.reach().expect("not asked");
+                        platform.check_present().expect("not asked");
                     } else {
                         let (device, at) = control_file(&system, way);
                         assert_lost(&platform, (&device, at), &format!("to {state:?}"));

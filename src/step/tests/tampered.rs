@@ -255,7 +255,7 @@ impl Platform for Tampered {
     }
 
     fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
-        self.reach()?;
+        self.check_present()?;
         let wait_limit = {
             let mut wires = self.wires();
             if wires.cancel_at == 1 {
@@ -296,7 +296,7 @@ impl Platform for Tampered {
     }
 
     fn unmask_interrupt(&self) -> Result<(), PlatformError> {
-        self.reach()?;
+        self.check_present()?;
         self.wires().masked = false;
         self.inner.unmask_interrupt()
     }
