@@ -90,7 +90,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
                 "{:?} is no option of a build: give one of binary16, thesis16, \
                  thesis16-literal, f32, arithmetic=f32|binary16, interlocked, unchecked, window=SLOTS, keep, flush, \
                  isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
-                 address-width=BITS, threads=N, lanes=on|off",
+                 address-width=BITS, fence=BASE+BYTES, threads=N, lanes=on|off",
                 text.split_once(',').expect("two words").1
             )
         );

@@ -13,6 +13,7 @@ use bitstream_model::{BoardConfig, EmulatedBoard, Subnormals};
 use cosim::flaws::{Flawed, Flaws};
 use cosim::packets::packets;
 use cosim::{accesses, outcome, random};
+use pgs_interface::fence::Fence;
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::result;
 use step_folder::folder::Folder;
@@ -23,7 +24,8 @@ use zynq_pgs::{
 const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
 fn config() -> BoardConfig {
-    BoardConfig { subnormals: Subnormals::Flush, ..BoardConfig::default() }
+    let fence = Some(Fence::default());
+    BoardConfig { subnormals: Subnormals::Flush, fence, ..BoardConfig::default() }
 }
 
 fn lock_step(inertia: Inertia, flaws: Flaws) -> LockStep {

@@ -96,10 +96,11 @@ fn a_board_is_not_served_without_its_simulator() {
 #[test]
 fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
     let folder = tempfile::tempdir().expect("a folder");
-    // It answers the first two requests, with the identification and the features of an interlocked
-    // accelerator.
-    let two_requests = "printf '1SGP\\002\\000\\000\\000'\nhead -c 24 >/dev/null\n";
-    let ends = program(folder.path(), &format!("#!/bin/sh\n{two_requests}"));
+    // It answers the first four requests: the identification, the features of an interlocked accelerator,
+    // and no fence.
+    let words = "1SGP\\002\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000";
+    let four_requests = format!("printf '{words}'\nhead -c 48 >/dev/null\n");
+    let ends = program(folder.path(), &format!("#!/bin/sh\n{four_requests}"));
     let mut command = serve(folder.path(), &ends, &[]);
     let server = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut server = Tied(server);

@@ -195,5 +195,5 @@ fn wrong_usage_is_refused() {
     }
     let help = run(["detect", "--help"]);
     assert_eq!(help.code, Some(0));
-    assert!(help.stdout.contains("pgs detect --input vectors/full_step186 --compare"));
+    assert!(help.stdout.contains("pgs detect --input tests/golden/pile5_step60 --compare"));
 }

@@ -35,7 +35,11 @@ impl System {
                 self.file(map.join(file), text);
             }
         }
-        self.file(Path::new("dev").join(format!("uio{number}")), "");
+        // As long as a device: each region is a page of it.
+        let device = self.0.path().join("dev").join(format!("uio{number}"));
+        self.file(&device, "");
+        let file = fs::File::options().write(true).open(&device).expect("there");
+        file.set_len(0x1000 * regions.len() as u64).expect("a sparse file");
     }
 
     /// Adds a u-dma-buf of this class.

@@ -171,11 +171,10 @@ fn only_an_emulated_board_of_this_process_shows_its_inside() {
         .find(|line| line.as_ref().is_ok_and(|line| line.starts_with("serving ")));
     assert!(serving.is_some(), "a board is served");
     let board = format!("socket:{}", text(&socket));
-    let memory = format!("file:{}.memory", text(&socket));
     let file = folder.path().join("step.vcd");
     let step = golden("one_cube");
     for verb in [&["solve", text(&step)][..], &["run", "--grid", "2x2x2"]] {
-        let there = ["--board", &board, "--memory", &memory, "--vcd", text(&file)];
+        let there = ["--board", &board, "--vcd", text(&file)];
         let ran = run(verb.iter().copied().chain(there));
         assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""));
         assert!(ran.stderr.contains("this board is served by another process"), "{}", ran.stderr);
