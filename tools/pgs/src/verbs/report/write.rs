@@ -4,12 +4,12 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use step_folder::replace::Replacement;
+use step_folder::replace::{ReplaceError, Replacement};
 
 use super::parts::Report;
 use super::{page, text};
 use crate::failure::{Cause, Failure};
-use crate::output::files::unwritten;
+use crate::output::files;
 
 /// The files beside the figures.
 const FILES: [&str; 3] = ["report.html", "report.md", "report.json"];
@@ -44,4 +44,9 @@ pub(super) fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Fail
     }
     replacement.commit().map_err(unwritten)?;
     Ok(files.into_iter().map(|(path, _)| path).collect())
+}
+
+/// The failure of a file that could not be written.
+fn unwritten(error: ReplaceError) -> Failure {
+    files::unwritten(error).next("make room, or name another folder with --out")
 }
