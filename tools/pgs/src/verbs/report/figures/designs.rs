@@ -1,10 +1,9 @@
 //! Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
 
 use bitstream_model::Bandwidth;
-use bitstream_model::estimate::thesis;
 use bitstream_model::estimate::thesis::recorded::{CPU, Design, GPU, Platform};
+use bitstream_model::estimate::{DESIGNS, thesis};
 use bitstream_model::estimate::{Records, StepTime};
-use bitstream_model::interface::profile::PROFILES;
 
 use super::super::chart::bars;
 use super::super::document::{Figure, Origin, Part, Row};
@@ -21,7 +20,7 @@ fn beside(
     ours: fn(&Outcome, &Platform) -> f64,
 ) -> Vec<(String, Beside)> {
     let shape = thesis::step();
-    PROFILES
+    DESIGNS
         .iter()
         .map(|profile| {
             let variant = profile.default_variant();
