@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of words.py and circles.py on planted sources.
+"""Tests of words.py, circles.py and lines.py on planted sources.
 
 usage: test_checks.py
 """
@@ -11,6 +11,7 @@ import unittest
 from pathlib import Path
 
 import circles
+import lines
 import words
 
 
@@ -98,6 +99,45 @@ class Circles(Planted):
         code, output = self.run_check(circles)
         self.assertEqual(code, 1)
         self.assertIn("crate::Nothing leads to no room", output)
+
+
+class Lines(Planted):
+    SOURCE = """
+        //! A comment.
+        const TEXT: &str = "// no comment
+            but text";
+        #[cfg(test)]
+        mod tests {
+            fn f() {}
+        }
+        fn product() {} // with a comment
+    """
+
+    def table(self, limit: int) -> str:
+        return f"| part | lines |\n|---|---|\n| `src` | {limit:,} |\n| `src/deep` | 1 |\n"
+
+    def check(self, limit: int, *files: str) -> tuple[int, str]:
+        self.plant({"docs/a.md": self.table(limit), "src/a.rs": self.SOURCE, "src/tests/b.rs": "fn t() {}"})
+        self.plant({"src/deep/c.rs": "fn c() {}"} | {name: "fn f() {}" for name in files})
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+            code = lines.main([str(self.folder / "docs/a.md")])
+        return code, output.getvalue()
+
+    def test_product_lines_leave_out_comments_and_tests(self):
+        code, output = self.check(3)
+        self.assertEqual(code, 0, output)
+        self.assertRegex(output, r"src +3 of +3\nsrc/deep +1 of +1\nall +4 of +4\n")
+
+    def test_a_part_that_grows_fails(self):
+        code, output = self.check(2)
+        self.assertEqual(code, 1)
+        self.assertIn("src has 1 lines more", output)
+
+    def test_a_file_in_no_part_fails(self):
+        code, output = self.check(3, "tools/d.rs")
+        self.assertEqual(code, 1)
+        self.assertIn("tools/d.rs is in no part", output)
 
 
 class Words(Planted):
