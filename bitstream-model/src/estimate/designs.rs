@@ -16,7 +16,7 @@ use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{
     Depth, FLOAT, HALF, NAIVE, OnChipMemory, Profile, RecordWords, Variant,
 };
-use pgs_interface::record::LANES;
+use pgs_interface::record::{LANES, collision};
 use pgs_interface::stripe::{Stripe, Stripes};
 
 /// Rows of a collision record relative to body A.
@@ -145,13 +145,13 @@ pub(crate) fn is_relative(profile: &Profile) -> bool {
 }
 
 /// Rows of a design's collision record.
-pub(crate) fn collision_rows(variant: &Variant) -> usize {
-    if is_relative(variant.profile) { RELATIVE_ROWS } else { variant.collision_rows() }
+pub(crate) fn collision_rows(profile: &Profile) -> usize {
+    if is_relative(profile) { RELATIVE_ROWS } else { collision::ROWS }
 }
 
 /// Rows of a design's collision record of a warm pass.
-pub(crate) fn warm_collision_rows(variant: &Variant) -> usize {
-    if is_relative(variant.profile) { RELATIVE_WARM_ROWS } else { variant.warm_collision_rows() }
+pub(crate) fn warm_collision_rows(profile: &Profile) -> usize {
+    if is_relative(profile) { RELATIVE_WARM_ROWS } else { collision::WARM_ROWS }
 }
 
 /// 32-bit words of a design's records on the streams.
@@ -159,6 +159,6 @@ pub(crate) fn warm_collision_rows(variant: &Variant) -> usize {
 pub fn words(variant: &Variant) -> RecordWords {
     let bits = variant.numbers.collisions.bits();
     #[expect(clippy::cast_possible_truncation, reason = "a record has few words")]
-    let numbers = (collision_rows(variant) * LANES) as u32;
+    let numbers = (collision_rows(variant.profile) * LANES) as u32;
     RecordWords { collision: numbers * bits / u32::BITS, ..variant.words() }
 }

@@ -182,7 +182,7 @@ impl StepTraffic {
                     collisions: Transfer::streamed(
                         collisions,
                         profile.collisions_per_issue,
-                        designs::collision_rows(variant),
+                        designs::collision_rows(profile),
                         formats.collisions,
                         &profile.stripes.collisions,
                         to,

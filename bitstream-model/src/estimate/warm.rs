@@ -41,7 +41,7 @@ impl WarmCost {
         let records = |count| {
             let format = variant.numbers.collisions;
             let (together, rows) =
-                (profile.collisions_per_issue, designs::warm_collision_rows(variant));
+                (profile.collisions_per_issue, designs::warm_collision_rows(profile));
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let kinds = [

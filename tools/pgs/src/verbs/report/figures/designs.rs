@@ -97,7 +97,8 @@ pub(crate) fn part() -> Result<Part, Failure> {
              the thesis' step. The thesis' figure has bars of its first design, and its text prints no numbers \
              of it. Our naive converts contacts within the passes, the thesis in a kernel of its own whose \
              rows go through memory: ours is a lower bound of its first design. mixed, windowed and \
-             windowed16 are this project's own.",
+             windowed16 are this project's own, and no boards: no hardware has them, and no processor \
+             of this class can order collisions for the last two.",
         )?,
         figure(
             "figure-6-2",
