@@ -7,6 +7,7 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 use nix::libc::O_NONBLOCK;
+use step_folder::replace::sync;
 
 use super::LoadError;
 
@@ -54,7 +55,7 @@ pub trait System: Debug {
     /// The system's.
     fn create(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        file.write_all(bytes).and_then(|()| file.sync_all()).inspect_err(|_| {
+        file.write_all(bytes).and_then(|()| sync(&file)).inspect_err(|_| {
             // Half a file is worse than none; the first error is reported.
             let _ = fs::remove_file(path);
         })
