@@ -281,41 +281,38 @@ const BINARY16_ON_CHIP: Numbers =
 #[test]
 fn impulses_beyond_the_words_of_a_collision_are_refused() {
     let count = scene(5).1.len();
-    for (profile, inertia) in [(&HALF, Inertia::World)] {
-        let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
-        let mut impulses = vec![Impulses::ZERO; count];
-        impulses[17].friction[1] = -65_505.0;
-        let found = refused(config, &impulses, &warm(Order::AsGiven));
-        let text = found.to_string();
-        assert!(
-            text.starts_with(
-                "collision 17: friction impulse[1] is -65505, but this bitstream holds collisions in \
-                 binary16, which ends at 65504"
-            ),
-            "{text}"
-        );
-        assert!(text.ends_with("world inertia: naive, float)"), "{text}");
-    }
+    let (profile, inertia) = (&HALF, Inertia::World);
+    let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+    let mut impulses = vec![Impulses::ZERO; count];
+    impulses[17].friction[1] = -65_505.0;
+    let found = refused(config, &impulses, &warm(Order::AsGiven));
+    let text = found.to_string();
+    assert!(
+        text.starts_with(
+            "collision 17: friction impulse[1] is -65505, but this bitstream holds collisions in \
+             binary16, which ends at 65504"
+        ),
+        "{text}"
+    );
+    assert!(text.ends_with("world inertia: naive, float)"), "{text}");
 }
 
 #[test]
 fn an_impulse_in_sixteen_bits_that_is_corrupted_on_its_way_fails_the_step() {
     let (bodies, collisions) = scene(5);
-    for profile in [&HALF] {
-        let inertia = Inertia::World;
-        let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
-        let (board, mut accelerator) = open_with(config, None, &shapes());
-        let plan: FaultPlan =
-            "corrupt=0x00000400@dma2.mm2s,phase=friction1,beat=3".parse().expect("a plan");
-        board.inject(plan);
-        let warm = warm(Order::AsGiven);
-        let error = accelerator.step(&mut bodies.clone(), &collisions, &warm).expect_err("a sum");
-        assert!(
-            matches!(&error, Error::Step { fault, .. } if matches!(**fault, Fault::Checksum { .. })),
-            "{error}"
-        );
-        accelerator.step(&mut bodies.clone(), &collisions, &warm).expect("the next works");
-    }
+    let (profile, inertia) = (&HALF, Inertia::World);
+    let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
+    let (board, mut accelerator) = open_with(config, None, &shapes());
+    let plan: FaultPlan =
+        "corrupt=0x00000400@dma2.mm2s,phase=friction1,beat=3".parse().expect("a plan");
+    board.inject(plan);
+    let warm = warm(Order::AsGiven);
+    let error = accelerator.step(&mut bodies.clone(), &collisions, &warm).expect_err("a sum");
+    assert!(
+        matches!(&error, Error::Step { fault, .. } if matches!(**fault, Fault::Checksum { .. })),
+        "{error}"
+    );
+    accelerator.step(&mut bodies.clone(), &collisions, &warm).expect("the next works");
 }
 
 fn refused(config: BoardConfig, impulses: &[Impulses], parameters: &StepParameters) -> InputError {
