@@ -53,7 +53,7 @@ impl CollisionPacker {
         let target = Target { variant: &self.variant, shapes, streamed_masses: false, quick: None };
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics };
         survey(target, bodies, bodies.len(), into, &mut PackPool::alone());
-        let entries = Entries { collisions, count, added: None, words: None };
+        let entries = Entries { collisions, count, added: None };
         let packers = &mut PackPool::alone();
         let (sum, seen) = pack_collisions(target, self.ends.ends(), &entries, channels, packers);
         seen.good.then_some(sum)
@@ -187,7 +187,7 @@ impl StepPacker {
         let count = collisions.len();
         let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
         let active = ..target.variant.profile.mm2s_widths.len();
-        let entries = Entries { collisions, count, added, words: None };
+        let entries = Entries { collisions, count, added };
         let channels = &mut channels[active];
         let (sum, seen) =
             pack_collisions(target, self.ends.ends(), &entries, channels, &mut self.packers);

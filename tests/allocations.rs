@@ -178,7 +178,7 @@ fn prepared_steps_allocate_nothing_once_both_banks_have_seen_a_step_of_that_size
     let cases = [
         (BoardConfig::default(), None),
         (BoardConfig::default(), Some(Order::HazardFree)),
-        (profile("mixed"), None),
+        (profile("half"), None),
     ];
     for (config, order) in cases {
         let counted = allocations_prepared(config, order);
@@ -189,7 +189,7 @@ fn prepared_steps_allocate_nothing_once_both_banks_have_seen_a_step_of_that_size
 
 #[test]
 fn steps_of_other_profiles_allocate_nothing_either() {
-    for name in ["half", "mixed", "naive"] {
+    for name in ["half", "naive"] {
         let counted = allocations(profile(name), None);
         assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
     }
@@ -197,33 +197,11 @@ fn steps_of_other_profiles_allocate_nothing_either() {
 
 #[test]
 fn written_steps_allocate_nothing() {
-    for name in ["float", "half", "mixed", "naive"] {
+    for name in ["float", "half", "naive"] {
         let counted = allocations_written(profile(name));
         assert!(counted[0] > 0, "the first step makes buffers: does the allocator count?");
         assert_eq!(counted[1..], [0; 9], "{name}: {counted:?}");
     }
-}
-
-/// The board has no part in preparing: the count is the driver's.
-#[test]
-fn preparing_allocates_nothing_on_a_design_that_keeps_live_bodies_alone() {
-    let mut accelerator = open(profile("windowed"));
-    let (mut bodies, collisions) = scene();
-    let parameters = StepParameters::default();
-    let mut flight =
-        accelerator.submit(&bodies, &collisions, &parameters).expect("nothing disturbs it");
-    let mut counted = Vec::with_capacity(10);
-    for step in 0..10 {
-        let before = COUNTED.get();
-        let of_step = &collisions[step % 3..];
-        let next = flight.prepare(&bodies, of_step, &parameters).expect("there is memory");
-        counted.push(COUNTED.get() - before);
-        let (ended, started) = flight.wait_and_start(&mut bodies, &next);
-        ended.expect("nothing disturbs it");
-        flight = started.expect("nothing disturbs it");
-    }
-    assert!(counted[0] > 0, "the second bank is made: does the allocator count?");
-    assert_eq!(counted[6..], [0; 4], "{counted:?}");
 }
 
 /// A repeated list of collisions that marks and counts the threads that read it.

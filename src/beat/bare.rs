@@ -4,8 +4,8 @@
 //! bytes as its record has. They look up no body, and mask, convert and check nothing. Packing can
 //! hardly take less time.
 
-use pgs_interface::profile::{Geometry, Variant};
-use pgs_interface::record::{Beat, LANES, collision, relative};
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{Beat, LANES, collision};
 
 use super::format::{Join, Records};
 use super::pack::encode::each;
@@ -51,18 +51,11 @@ fn dealt<'p, L: CollisionSource<'p>>(
     let Some((pattern, first)) = Pattern::of(layout.stripe.streams) else { return 0 };
     let rest = channels.get_mut(first..).unwrap_or_default();
     let per_beat = layout.rows_per_beat();
-    in_wide_vectors(Dealing {
-        geometry: variant.profile.geometry,
-        per_beat,
-        pattern,
-        collisions,
-        rest,
-    })
+    in_wide_vectors(Dealing { per_beat, pattern, collisions, rest })
 }
 
 /// Collisions, and where they go.
 struct Dealing<'c, 'b, L> {
-    geometry: Geometry,
     per_beat: usize,
     pattern: Pattern,
     collisions: L,
@@ -74,18 +67,18 @@ impl<'p, L: CollisionSource<'p>> Work for Dealing<'_, '_, L> {
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> usize {
-        let Self { geometry, per_beat, pattern, collisions, rest } = self;
+        let Self { per_beat, pattern, collisions, rest } = self;
         let (records, sum) = (&mut AsTheyLie(collisions), &mut Lanes::all(0));
         macro_rules! written {
-            ($join:ty, $rows:expr) => {
-                unrolled::write::<V, $join, _, { $rows }>(pattern, vectors, records, rest, sum)
+            ($join:ty) => {
+                unrolled::write::<V, $join, _, { collision::ROWS }>(
+                    pattern, vectors, records, rest, sum,
+                )
             };
         }
-        match (geometry, per_beat) {
-            (Geometry::Absolute, 1) => written!(Alone, collision::ROWS),
-            (Geometry::Absolute, _) => written!(Folded, collision::ROWS),
-            (Geometry::Relative, 1) => written!(Alone, relative::ROWS),
-            (Geometry::Relative, _) => written!(Folded, relative::ROWS),
+        match per_beat {
+            1 => written!(Alone),
+            _ => written!(Folded),
         }
     }
 }

@@ -25,7 +25,7 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, pose, result, velocity_result};
+use pgs_interface::record::{LANES, collision, pose, result, velocity_result};
 use pgs_interface::stripe::Stripe;
 
 /// The records that a segment carries.
@@ -71,11 +71,11 @@ impl Segment {
         let (stripes, numbers) = (&variant.profile.stripes, &variant.numbers);
         let (rows, format, stripe) = match self {
             Self::Velocities => (variant.velocity_rows(), numbers.bodies, stripes.velocities),
-            Self::Collisions => (variant.collision_rows(), numbers.collisions, stripes.collisions),
+            Self::Collisions => (collision::ROWS, numbers.collisions, stripes.collisions),
             Self::WarmCollisions => match stripes.warm_collisions {
-                Some(stripe) => (variant.warm_collision_rows(), numbers.collisions, stripe),
+                Some(stripe) => (collision::WARM_ROWS, numbers.collisions, stripe),
                 // No step of this design has such a pass.
-                None => (variant.collision_rows(), numbers.collisions, stripes.collisions),
+                None => (collision::ROWS, numbers.collisions, stripes.collisions),
             },
             Self::Poses => (pose::ROWS, numbers.poses, stripes.poses),
             Self::Results => (result::ROWS, numbers.poses, stripes.results),
@@ -171,9 +171,7 @@ mod tests {
     use super::Segment::{Collisions, Poses, Results, Velocities, WarmCollisions};
     use super::*;
     use pgs_interface::address_map::DMA_COUNT_MAX;
-    use pgs_interface::profile::{
-        FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
-    };
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Profile};
     use proptest::prelude::*;
 
     const SEGMENTS: [Segment; 5] = [Velocities, Collisions, WarmCollisions, Poses, Results];
@@ -210,10 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn mixed_and_naive_end_with_the_array() {
-        assert_eq!(counts(&MIXED, Collisions, 127_000), [127_000; 3]);
-        assert_eq!(counts(&MIXED, Velocities, 2), [2, 1, 1]);
-        assert_eq!(counts(&MIXED, Results, 1), [2, 1, 1]);
+    fn naive_ends_with_the_array() {
         assert_eq!(counts(&NAIVE, Collisions, 3), [21]);
         assert_eq!(counts(&NAIVE, Poses, 3), [6]);
     }
@@ -224,7 +219,6 @@ mod tests {
         assert_eq!(counts(&NAIVE, WarmCollisions, 5), [40]);
         assert_eq!(counts(&FLOAT, WarmCollisions, 5), [10; 4]);
         assert_eq!(counts(&HALF, WarmCollisions, 5), [9, 9, 6]);
-        assert_eq!(counts(&MIXED, WarmCollisions, 5), [5, 5, 10]);
     }
 
     #[test]
@@ -280,13 +274,6 @@ mod tests {
                 assert!(streams.iter().all(|stream| usize::from(*stream) < channels));
             }
             let layout = Collisions.layout(&variant);
-            if layout.stripe.padded {
-                assert_eq!(profile.geometry, Geometry::Absolute, "{}: 0 is a count", profile.name);
-            }
-            if profile.flow != Flow::Passes {
-                // The units of a windowed design take any number of collisions.
-                continue;
-            }
             let issue = profile.collisions_per_issue as usize;
             for records in 0..=2 * issue {
                 let rows = layout.beats(records) * layout.rows_per_beat();

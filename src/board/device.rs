@@ -273,7 +273,7 @@ impl Device {
             };
             queue(&segments.velocities)?;
             if plan.collisions > 0 {
-                for pass in 0..plan.rounds() {
+                for pass in 0..plan.passes.total() {
                     queue(segments.of_pass(pass, plan.passes))?;
                 }
             }

@@ -29,8 +29,8 @@ pub struct OpenOptions {
     /// Threads that write the records of a step and read its results, including the caller's: 1 to
     /// 64; a number outside is clamped. `None` takes one per processor, at most four. Records and
     /// results do not depend on the number. The caller's thread works alone on up to about 2,000
-    /// bodies or collisions, and on the results of a design that keeps live bodies alone. The other
-    /// threads start with the first larger step, and end with the accelerator.
+    /// bodies or collisions. The other threads start with the first larger step, and end with the
+    /// accelerator.
     ///
     /// These threads call [`Bodies`](crate::Bodies) and [`Collisions`](crate::Collisions) while the
     /// caller's thread waits. A container that depends on the caller's thread (thread-local data, a

@@ -1,7 +1,5 @@
 //! Maps a descriptor of a step to the phase that it belongs to.
 
-use pgs_interface::profile::Flow;
-
 use super::plan::{Plan, bytes};
 use crate::axi_dma::pieces;
 use crate::fault::Phase;
@@ -26,7 +24,7 @@ impl Outline {
         let count = |beats: usize| pieces(bytes(beats), self.largest).count();
         let load = count(segments.velocities.len());
         let Some(mut behind) = descriptor.checked_sub(load) else { return Phase::Load };
-        for pass in 0..self.plan.rounds() {
+        for pass in 0..self.plan.passes.total() {
             let of_pass = count(segments.of_pass(pass, self.plan.passes).len());
             match behind.checked_sub(of_pass) {
                 None => return self.phase_of_pass(pass),
@@ -43,12 +41,9 @@ impl Outline {
 
     fn phase_of_pass(&self, pass: u64) -> Phase {
         let pass = u32::try_from(pass).unwrap_or(u32::MAX);
-        match self.plan.variant.profile.flow {
-            Flow::Window(_) => Phase::Collisions,
-            Flow::Passes => match pass.checked_sub(self.plan.passes.contact) {
-                None => Phase::Contact(pass + 1),
-                Some(friction) => Phase::Friction(friction + 1),
-            },
+        match pass.checked_sub(self.plan.passes.contact) {
+            None => Phase::Contact(pass + 1),
+            Some(friction) => Phase::Friction(friction + 1),
         }
     }
 }
@@ -57,7 +52,7 @@ impl Outline {
 mod tests {
     use super::*;
     use crate::scene::Passes;
-    use pgs_interface::profile::{FLOAT, WINDOWED};
+    use pgs_interface::profile::FLOAT;
 
     fn outline(variant: pgs_interface::profile::Variant, collisions: usize) -> Outline {
         let passes = Passes { contact: 3, friction: 2, ..Passes::default() };
@@ -94,13 +89,5 @@ mod tests {
     fn without_collisions_the_poses_follow_the_load() {
         let outline = outline(FLOAT.default_variant(), 0);
         assert_eq!([3, 4].map(|index| outline.phase_of(0, index)), [Phase::Load, Phase::Poses]);
-    }
-
-    #[test]
-    fn a_design_that_streams_once_has_no_passes() {
-        let outline = outline(WINDOWED.default_variant(), 3);
-        let phases: Vec<_> = (0..4).map(|channel| outline.phase_of(channel, 0)).collect();
-        // Collisions on channels 0 and 1, velocities on 2, poses on 3.
-        assert_eq!(phases, [Phase::Collisions, Phase::Collisions, Phase::Load, Phase::Poses]);
     }
 }

@@ -14,7 +14,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use pgs_interface::profile::{Flow, Variant};
+use pgs_interface::profile::Variant;
 use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::IMPULSES_STREAM;
 
@@ -32,7 +32,7 @@ const ALIGNMENT: usize = 64 / BEAT_BYTES;
 /// The number and layout of the records that a step streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Plan {
-    /// Records of bodies. A design that keeps live bodies alone has records of moving bodies only.
+    /// Records of bodies.
     pub(crate) bodies: usize,
     /// Records of collisions, padding included.
     pub(crate) collisions: usize,
@@ -87,14 +87,6 @@ impl Plan {
         self.variant.profile.mm2s_widths.len()
     }
 
-    /// How often the collisions are streamed.
-    pub(crate) fn rounds(&self) -> u64 {
-        match self.variant.profile.flow {
-            Flow::Passes => self.passes.total(),
-            Flow::Window(_) => self.passes.total().min(1),
-        }
-    }
-
     /// The segments of one MM2S channel.
     pub(crate) fn segments(&self, channel: usize) -> Segments {
         let place = |segment: Segment, records, start: usize| {
@@ -146,7 +138,7 @@ impl Plan {
         let segments = self.segments(channel);
         let warm = |part: &Option<Range<usize>>| part.clone().map(count);
         let (contact, friction) = (warm(&segments.warm_contact), warm(&segments.warm_friction));
-        let others = self.rounds() - self.warm_rounds(&segments);
+        let others = self.passes.total() - self.warm_rounds(&segments);
         let others = usize::try_from(others).unwrap_or(usize::MAX);
         (count(segments.velocities) + count(segments.poses))
             .saturating_add(count(segments.collisions).saturating_mul(others))
@@ -164,7 +156,7 @@ impl Plan {
         (0..self.channels())
             .map(|channel| {
                 let segments = self.segments(channel);
-                let others = self.rounds() - self.warm_rounds(&segments);
+                let others = self.passes.total() - self.warm_rounds(&segments);
                 let Segments { velocities, poses, collisions, warm_contact, warm_friction } =
                     segments;
                 let warm = [warm_contact, warm_friction].into_iter().flatten();
@@ -209,7 +201,7 @@ mod tests {
     use crate::control_block::{fake, identify};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE};
 
     const FOUR: Plan = Plan {
         bodies: 38_881,
@@ -299,7 +291,6 @@ mod tests {
         // A beat a record, filled up to five: 38,885. Two collisions in seven beats. 77,762 beats
         // of results, filled up to five: 77,765.
         assert_eq!(bytes(HALF.default_variant()), (2 * 38_885 + 8 * 7 * (collisions / 2), 77_765));
-        assert_eq!(bytes(MIXED.default_variant()), (4 * bodies + 8 * 3 * collisions, 4 * bodies));
         // Twice the velocities: four beats a body in f32; in half two, 77,762 filled up to five.
         let world = |variant| Variant { inertia: Inertia::World, ..variant };
         assert_eq!(
@@ -310,19 +301,6 @@ mod tests {
             bytes(world(HALF.default_variant())),
             (77_765 + 38_885 + 8 * 7 * (collisions / 2), 77_765)
         );
-    }
-
-    /// Once, however many passes there are: velocities on channel 2, poses on channel 3.
-    #[test]
-    fn a_design_that_streams_the_collisions_once_does() {
-        let variant = WINDOWED.default_variant();
-        let plan = Plan { bodies: 38_880, variant, ..FOUR };
-        assert_eq!(plan.bytes_to_device(), 16 * (4 * 38_880 + 6 * 127_746));
-        assert_eq!(plan.bytes_from_device(), 16 * 4 * 38_880);
-        let counts: Vec<_> = (0..4).map(|channel| plan.descriptors(channel, 67_108_800)).collect();
-        assert_eq!(counts, [1, 1, 1, 1]);
-        let none = Plan { passes: Passes::default(), ..plan };
-        assert_eq!(none.bytes_to_device(), 16 * 4 * 38_880);
     }
 
     #[test]

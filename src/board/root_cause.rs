@@ -187,9 +187,7 @@ pub(crate) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) ->
             ErrorCode::BodyIndex
             | ErrorCode::ContactCount
             | ErrorCode::StaticPair
-            | ErrorCode::SelfCollision
-            | ErrorCode::EmptyPlace
-            | ErrorCode::Deadlock,
+            | ErrorCode::SelfCollision,
         ) => (false, Subject::Collision { sent: detail, given: usize::try_from(detail).ok() }),
         Some(ErrorCode::ShapeIndex) => {
             (false, Subject::Body { sent: detail, given: usize::try_from(detail).ok() })

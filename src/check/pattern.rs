@@ -160,7 +160,7 @@ fn short_number(seed: u32, index: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF};
 
     fn of(variant: &Variant) -> (Pattern, usize) {
         (Pattern::of(variant), variant.profile.s2mm_widths.len())
@@ -215,9 +215,9 @@ mod tests {
 
     #[test]
     fn a_half_way_array_shortens_the_numbers_of_wide_streams() {
-        assert!(!Pattern::of(&MIXED.default_variant()).short);
-        let numbers = Numbers { velocities: Precision::Binary16, ..MIXED.numbers };
-        let pattern = Pattern::of(&Variant { numbers, ..MIXED.default_variant() });
+        assert!(!Pattern::of(&FLOAT.default_variant()).short);
+        let numbers = Numbers { velocities: Precision::Binary16, ..FLOAT.numbers };
+        let pattern = Pattern::of(&Variant { numbers, ..FLOAT.default_variant() });
         let bodies = pattern.bodies(1, 100);
         assert!(bodies.iter().all(|body| body.velocity.linear[0].to_bits().trailing_zeros() >= 13));
         assert_eq!(pattern.filler()(Direction::Mm2s, 0, 7).0[0].trailing_zeros().min(13), 13);

@@ -6,15 +6,13 @@ use pgs_interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
     FENCE_BASE, FENCE_SIZE, FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE,
     MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY,
-    SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, WINDOW, WINDOW_CAPACITY, channels, depth,
-    dma, features, issue, memory_per_record, numbers, version, window as window_units,
-    window_capacity,
+    SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, channels, depth, dma, features, issue,
+    memory_per_record, numbers, version,
 };
 use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{Depth, Flow, Geometry, Inertia, Profile, Variant, Window as Live};
-use pgs_interface::record::live;
+use pgs_interface::profile::{Depth, Inertia, Profile, Variant};
 use pgs_interface::register::{Field, Register};
 use thiserror::Error;
 
@@ -50,8 +48,6 @@ pub struct Capabilities {
     pub contact: Depth,
     /// Depth of the friction pipeline, cycles.
     pub friction: Depth,
-    /// Units, places and delay lines of a design that streams the collisions once.
-    pub window: Option<Live>,
     /// Clock of the accelerator and its streams, kHz.
     pub clock_khz: u32,
     /// Largest number of bodies.
@@ -203,19 +199,8 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     })?;
     let fence = fence_of(window)?;
     let clock_khz = checked(window, &CLOCK_KHZ, "a clock above 0", |word| word > 0)?;
-    let live = match profile.flow {
-        Flow::Passes => None,
-        Flow::Window(_) => {
-            checked(window, &FEATURES, "a design that streams once to be interlocked", |word| {
-                features::INTERLOCKED.is_set(word)
-            })?;
-            Some(live_of(window)?)
-        }
-    };
     let memory = checked(window, &MEMORY_PER_RECORD, "bytes above 0", |word| {
-        // A design that keeps live bodies alone has memory of a fixed size.
-        live.is_some()
-            || (memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0)
+        memory_per_record::BODY.of(word) > 0 && memory_per_record::COLLISION.of(word) > 0
     })?;
     let depth_of = |register: &Register| {
         let word = read(register);
@@ -236,7 +221,6 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         collisions_per_issue: issue::COLLISIONS.of(interval),
         contact: depth_of(&CONTACT_DEPTH),
         friction: depth_of(&FRICTION_DEPTH),
-        window: live,
         clock_khz,
         body_capacity: read(&BODY_CAPACITY),
         collision_capacity: read(&COLLISION_CAPACITY),
@@ -258,28 +242,6 @@ fn fence_of(window: &Window) -> Result<Option<Fence>, IdentityError> {
                     of 64 KiB, at a multiple of it";
     let size = checked(window, &FENCE_SIZE, expected, |size| segment(size).is_ok())?;
     Ok(segment(size).unwrap_or_default())
-}
-
-/// Reads the units, places and delay lines of a design that keeps live bodies alone.
-fn live_of(window: &Window) -> Result<Live, IdentityError> {
-    let units = checked(window, &WINDOW, "at least one unit of each kind", |word| {
-        window_units::CONTACT_UNITS.of(word) > 0 && window_units::FRICTION_UNITS.of(word) > 0
-    })?;
-    let room = checked(
-        window,
-        &WINDOW_CAPACITY,
-        "2 places to as many as a record can name, and delay lines",
-        |word| {
-            (2..=live::PLACE + 1).contains(&window_capacity::SLOTS.of(word))
-                && window_capacity::LAG.of(word) > 0
-        },
-    )?;
-    Ok(Live {
-        contact_units: window_units::CONTACT_UNITS.of(units),
-        friction_units: window_units::FRICTION_UNITS.of(units),
-        slots: window_capacity::SLOTS.of(room),
-        lag: window_capacity::LAG.of(room),
-    })
 }
 
 /// A stream width as `MM2S_WIDTHS` and `S2MM_WIDTHS` code it: log2 of its bytes.
@@ -315,9 +277,6 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
         || numbers.poses.bits() != own.poses.bits()
     {
         return Err(refused("words as wide on the streams as the profile has them"));
-    }
-    if profile.geometry == Geometry::Relative && !numbers.collisions.has_zero_and_infinity() {
-        return Err(refused("a format with an infinity, which marks an absent contact point"));
     }
     if world && !numbers.bodies.has_zero_and_infinity() {
         return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
@@ -380,7 +339,7 @@ mod tests {
     use super::*;
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
     fn identify_with(changes: &[(u32, u32)]) -> Result<Capabilities, IdentityError> {
         let registers = FakeRegisters::default();
@@ -474,59 +433,17 @@ mod tests {
         (0x11C, 0x0002_0003),
         (0x144, 0x0111_1111),
     ];
-    const MIXED_REGISTERS: [(u32, u32); 6] = [
-        (0x108, 4),
-        (0x110, 0x0303),
-        (0x114, 0x444),
-        (0x118, 0x444),
-        (0x11C, 0x0001_0001),
-        (0x144, 0x0000_0001),
-    ];
     const NAIVE_REGISTERS: [(u32, u32); 5] =
         [(0x108, 2), (0x110, 0x0101), (0x114, 0x2), (0x118, 0x2), (0x11C, 0x0001_001C)];
 
     #[test]
     fn every_profile_is_known_by_its_registers() {
-        for (registers, profile, channels) in [
-            (&NAIVE_REGISTERS[..], &NAIVE, 1),
-            (&HALF_REGISTERS[..], &HALF, 3),
-            (&MIXED_REGISTERS[..], &MIXED, 3),
-        ] {
+        for (registers, profile, channels) in
+            [(&NAIVE_REGISTERS[..], &NAIVE, 1), (&HALF_REGISTERS[..], &HALF, 3)]
+        {
             let found = identify_with(registers).expect(profile.name);
             assert_eq!(found.variant, profile.default_variant());
             assert_eq!((found.mm2s_channels, found.s2mm_channels), (channels, channels));
-        }
-    }
-
-    /// Two units of each kind, 8,191 places and that of static bodies, delay lines of 2,816
-    /// entries.
-    const WINDOWED_REGISTERS: [(u32, u32); 5] = [
-        (0x108, 5),
-        (0x11C, 0x0001_0002),
-        (0x13C, 0),
-        (0x148, 0x0202),
-        (0x14C, (2_816 << 16) | 8_192),
-    ];
-
-    #[test]
-    fn a_design_that_keeps_live_bodies_says_how_many_and_how_long() {
-        let found = identify_with(&WINDOWED_REGISTERS).expect("well formed");
-        assert_eq!(found.variant, WINDOWED.default_variant());
-        let window = Live { contact_units: 2, friction_units: 2, slots: 8_192, lag: 2_816 };
-        assert_eq!(found.window, Some(window));
-        assert_eq!((found.bytes_per_body, found.bytes_per_collision), (0, 0));
-        assert_eq!(identify_with(&[]).expect("well formed").window, None);
-        for (at, value, named) in [
-            (0x10C, 0x9, "FEATURES"),
-            (0x148, 0x0002, "WINDOW is"),
-            (0x148, 0x0200, "WINDOW is"),
-            (0x14C, (2_816 << 16) | 1, "WINDOW_CAPACITY"),
-            (0x14C, (2_816 << 16) | 8_193, "WINDOW_CAPACITY"),
-            (0x14C, 8_192, "WINDOW_CAPACITY"),
-        ] {
-            let registers = [&WINDOWED_REGISTERS[..], &[(at, value)]].concat();
-            let error = identify_with(&registers).expect_err(named).to_string();
-            assert!(error.starts_with(named), "{error}");
         }
     }
 
@@ -552,12 +469,6 @@ mod tests {
         let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
         let error = error.expect_err("no zero").to_string();
         assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
-        // An absent point can be written in neither format of the thesis.
-        for format in [2, 3] {
-            let error = with(&MIXED_REGISTERS, &[(0x144, format)]).expect_err("no infinity");
-            let (error, begin) = (error.to_string(), format!("NUMBERS is 0x0000000{format}"));
-            assert!(error.starts_with(&begin) && error.contains("infinity"), "{error}");
-        }
         let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");
         let numbers = literal.variant.numbers;
         let of_streams = [numbers.collisions, numbers.bodies, numbers.poses];

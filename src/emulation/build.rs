@@ -143,8 +143,6 @@ mod tests {
         assert_eq!((half.collisions, half.bodies), (thesis, thesis));
         assert_eq!((half.rows, half.updates), (Precision::F32, Precision::F32));
         assert_eq!(half.velocities, Precision::Binary16, "storage stays");
-        let (_, mixed) = numbers("mixed", Some(thesis), None);
-        assert_eq!((mixed.collisions, mixed.bodies), (thesis, StreamFormat::F32));
         // The board refuses it, and names the reason.
         let (_, float) = numbers("float", Some(thesis), None);
         assert_eq!((float.collisions, float.bodies), (thesis, thesis));

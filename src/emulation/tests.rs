@@ -20,14 +20,13 @@ fn a_build_is_written_as_it_is_read() {
         "naive",
         "float",
         "half",
-        "mixed",
         "float,interlocked",
         "half,thesis16,f32,unchecked",
         "half,f32,unchecked,world",
         "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
         "float,fence=0x40000000+512M",
-        "mixed,bandwidth=17.07,threads=1,lanes=off",
+        "float,bandwidth=17.07,threads=1,lanes=off",
     ] {
         let build = build(text).expect(text);
         assert_eq!(build.to_string(), text);
@@ -75,10 +74,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
     for text in ["", ",float", "Float", "unchecked", "float half", "profile=half"] {
         let error = build(text).expect_err(text);
         assert!(matches!(error, BuildError::Profile { .. }), "{error}");
-        assert!(
-            error.to_string().contains("(naive, float, half, mixed, windowed, windowed16)"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("(naive, float, half)"), "{error}");
     }
     for text in
         ["float,", "float,double", "float,window", "float,colour=red", "float, world", "float,on"]

@@ -343,8 +343,6 @@ impl AcceleratorError {
             Some(ErrorCode::SelfCollision) => "accelerator-self-collision",
             Some(ErrorCode::Argument) => "accelerator-argument",
             Some(ErrorCode::PartialBeat) => "accelerator-partial-beat",
-            Some(ErrorCode::EmptyPlace) => "accelerator-empty-place",
-            Some(ErrorCode::Deadlock) => "accelerator-deadlock",
             _ => "accelerator-unknown",
         }
     }

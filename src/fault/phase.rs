@@ -11,8 +11,6 @@ use std::fmt;
 pub enum Phase {
     /// The velocities go in.
     Load,
-    /// The collisions go in, once for all passes.
-    Collisions,
     /// The collisions go in for a contact pass, from 1; a warm pass is the first.
     Contact(u32),
     /// The collisions go in for a friction pass, from 1; a warm pass is the first.
@@ -29,7 +27,6 @@ impl Phase {
     pub fn name(self) -> String {
         match self {
             Self::Load => "load".to_owned(),
-            Self::Collisions => "collisions".to_owned(),
             Self::Contact(pass) => format!("contact{pass}"),
             Self::Friction(pass) => format!("friction{pass}"),
             Self::Poses => "poses".to_owned(),
@@ -42,7 +39,6 @@ impl fmt::Display for Phase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Load => f.write_str("the load of the velocities"),
-            Self::Collisions => f.write_str("the collisions"),
             Self::Contact(pass) => write!(f, "contact pass {pass}"),
             Self::Friction(pass) => write!(f, "friction pass {pass}"),
             Self::Poses => f.write_str("the poses"),

@@ -1,10 +1,9 @@
 //! The distance that the uses of a body must have, counted in issue slots.
 
-use pgs_interface::profile::{Depth, Flow, Profile, Variant};
+use pgs_interface::profile::{Depth, Profile, Variant};
 
 use super::OrderError;
 use crate::control_block::Capabilities;
-use crate::scene::StepParameters;
 
 /// Hazard window of a pipeline in issue slots, and number of collisions in each of them.
 ///
@@ -37,56 +36,33 @@ impl IssueWindow {
     }
 
     /// The window of a step on a bitstream: the deeper of its two pipelines, since one order serves
-    /// both. Where all passes run side by side, an issue slot is the time in which every pass
-    /// issues one collision. It depends on the number of passes.
+    /// both.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn of(
-        capabilities: &Capabilities,
-        parameters: &StepParameters,
-    ) -> Result<Self, OrderError> {
+    pub fn of(capabilities: &Capabilities) -> Result<Self, OrderError> {
         let Capabilities { variant, contact, friction, .. } = capabilities;
         // The values that the bitstream reports replace the values of its profile.
         let reported = Profile {
             initiation_interval: capabilities.initiation_interval,
             collisions_per_issue: capabilities.collisions_per_issue,
-            flow: capabilities.window.map_or(Flow::Passes, Flow::Window),
             ..*variant.profile
         };
-        Self::of_depths(&reported, [*contact, *friction], parameters)
+        Self::of_depths(&reported, [*contact, *friction])
     }
 
     /// The window of a step on a design with the values of its profile; errors as
     /// [`new`](Self::new).
-    pub(crate) fn of_variant(
-        variant: &Variant,
-        parameters: &StepParameters,
-    ) -> Result<Self, OrderError> {
+    pub(crate) fn of_variant(variant: &Variant) -> Result<Self, OrderError> {
         let depths = [variant.contact(), variant.friction()];
-        Self::of_depths(variant.profile, depths, parameters)
+        Self::of_depths(variant.profile, depths)
     }
 
-    fn of_depths(
-        profile: &Profile,
-        depths: [Depth; 2],
-        parameters: &StepParameters,
-    ) -> Result<Self, OrderError> {
+    fn of_depths(profile: &Profile, depths: [Depth; 2]) -> Result<Self, OrderError> {
         let [contact, friction] = depths.map(|depth| depth.window);
         let cycles = contact.max(friction);
-        let (slot, per_issue) = match profile.flow {
-            Flow::Passes => (profile.initiation_interval, profile.collisions_per_issue),
-            Flow::Window(window) => {
-                let slot = window.slot_cycles(
-                    parameters.contact_iterations,
-                    parameters.friction_iterations,
-                    profile.initiation_interval,
-                    profile.collisions_per_issue,
-                );
-                (slot, 1)
-            }
-        };
-        Self::new(cycles.div_ceil(slot.max(1)).max(1), per_issue)
+        let slots = cycles.div_ceil(profile.initiation_interval.max(1));
+        Self::new(slots.max(1), profile.collisions_per_issue)
     }
 
     /// Issue slots from a use of a body to the first slot that reads its write-back.
@@ -123,23 +99,13 @@ mod tests {
         assert_eq!((window.depth(), window.per_issue(), window.entries()), (158, 2, 316));
     }
 
-    /// 316 cycles, `float`'s 324, by the interval of each: 28, 2, 3, 1; two passes a unit: 4 and 3
-    /// cycles.
+    /// 316 cycles, `float`'s 324, by the interval of each: 28, 2, 3.
     #[test]
     fn the_window_of_a_profile_is_that_of_its_deeper_pipeline() {
-        let of = |profile: &'static Profile, parameters: &StepParameters| {
-            let variant = profile.default_variant();
-            let window = IssueWindow::of_variant(&variant, parameters).expect("a window");
+        let windows = profile::PROFILES.iter().map(|profile| {
+            let window = IssueWindow::of_variant(&profile.default_variant()).expect("a window");
             (window.depth(), window.per_issue())
-        };
-        let bullet = StepParameters::default();
-        let windows: Vec<_> = profile::PROFILES.iter().map(|each| of(each, &bullet)).collect();
-        assert_eq!(windows, [(12, 1), (162, 1), (106, 2), (316, 1), (79, 1), (106, 1)]);
-        // Twice the number of contact passes take turns on their units.
-        let twice = StepParameters { contact_iterations: 8, ..bullet };
-        assert_eq!(of(&profile::WINDOWED, &twice), (40, 1));
-        assert_eq!(of(&profile::FLOAT, &twice), (162, 1));
-        let none = StepParameters { contact_iterations: 0, friction_iterations: 0, ..bullet };
-        assert_eq!(of(&profile::WINDOWED, &none), (316, 1));
+        });
+        assert_eq!(windows.collect::<Vec<_>>(), [(12, 1), (162, 1), (106, 2)]);
     }
 }

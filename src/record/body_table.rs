@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{POSITION, alone, row_of};
+use super::{POSITION, row_of};
 use crate::scene::{Body, Shape};
 use crate::simd::{Lanes, fetch};
 use pgs_interface::number::StreamFormat;
@@ -49,12 +49,6 @@ impl End {
     #[inline(always)]
     pub(crate) fn with_tag(&self) -> Lanes {
         Lanes::from(bytemuck::cast::<_, Beat>(*self))
-    }
-
-    /// The position beside zero.
-    #[inline(always)]
-    pub(crate) fn alone(&self) -> Lanes {
-        alone(self.with_tag())
     }
 
     /// Whether the body is static.

@@ -10,7 +10,6 @@ pub(crate) mod finite;
 pub(crate) mod inertia;
 pub(crate) mod largest;
 pub(crate) mod pose;
-pub(crate) mod relative;
 pub(crate) mod result;
 pub(crate) mod sixteen;
 pub(crate) mod source;
@@ -25,8 +24,6 @@ use bytemuck::Pod;
 use crate::scene::{Body, Collision, Contact};
 use crate::simd::{Integer, Lanes};
 use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
-
-use self::largest::MAGNITUDE;
 
 /// A record in f32, before it is streamed.
 #[derive(Debug, Clone, Copy)]
@@ -229,28 +226,6 @@ pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
     used
 }
 
-/// The masks of [`used`] without the sign bits. A table is faster here: it takes fewer instructions
-/// than a comparison and the removal of the sign. The masks of a count beyond four, which
-/// validation refuses, are unspecified.
-#[inline(always)]
-pub(crate) fn used_magnitudes(count: u32) -> [Lanes; CONTACT_POINTS] {
-    USED_MAGNITUDES[count as usize % USED_MAGNITUDES.len()].map(Lanes::from)
-}
-
-static USED_MAGNITUDES: [[Beat; CONTACT_POINTS]; (CONTACT_POINTS + 1).next_power_of_two()] = {
-    let mut table = [[Beat([0; LANES]); CONTACT_POINTS]; (CONTACT_POINTS + 1).next_power_of_two()];
-    let mut count = 0;
-    while count <= CONTACT_POINTS {
-        let mut ordinal = 0;
-        while ordinal < count {
-            table[count][ordinal] = Beat([MAGNITUDE; LANES]);
-            ordinal += 1;
-        }
-        count += 1;
-    }
-    table
-};
-
 /// The vec3 of a beat. The word beside it is ignored.
 #[inline]
 fn to_vec3(Beat([x, y, z, _]): Beat) -> [f32; 3] {
@@ -279,19 +254,5 @@ mod tests {
         assert_eq!((*of.collision, of.count()), (Collision::NOTHING, 0));
         let one = Collision { count: 1, ..empty };
         assert_eq!(Counted::from(&one).collision.body_a, 7);
-    }
-
-    #[test]
-    fn magnitudes_that_are_used_are_those_of_what_is_used() {
-        for count in 0..=4 {
-            let magnitudes = used_magnitudes(count).map(Lanes::words);
-            assert_eq!(magnitudes, used(count).map(|used| used.and(Lanes::all(MAGNITUDE)).words()));
-        }
-        // The masks of larger counts are unspecified, but each is whole or zero.
-        for count in [5, 7, 8, u32::MAX] {
-            for row in used_magnitudes(count).map(Lanes::words) {
-                assert!([[0; LANES], [MAGNITUDE; LANES]].contains(&row), "{count}: {row:x?}");
-            }
-        }
     }
 }

@@ -9,7 +9,7 @@
 pub enum Order {
     /// As given. Sorted collisions use the same body many times in a row: hazards abound. Where a
     /// caller asks for this order, the board gets an empty collision as padding, which takes its
-    /// place among the others; only a bitstream that keeps live bodies alone gets none.
+    /// place among the others.
     AsGiven,
     /// Body by body, as the thesis proposes (§4.7): few bodies alive, nearly every use a hazard.
     BodyByBody(Ties),

@@ -153,7 +153,6 @@ pub struct StepParameters {
     /// |---|---|
     /// | waits on hazards | [`Order::HazardFreeNearby`] without its empty entries, unless [`Order::AsGiven`] takes fewer cycles |
     /// | does not wait | [`Order::HazardFreeNearby`] |
-    /// | keeps only live bodies on chip | [`Order::HazardFree`] |
     ///
     /// [`StepReport::order_choice`](crate::StepReport::order_choice) has the figures of the
     /// comparison.
@@ -163,9 +162,7 @@ pub struct StepParameters {
     /// solver choose [`Order::AsGiven`].
     ///
     /// A pipeline that does not wait reads stale velocities at every hazard and loses impulses:
-    /// with any order that has hazards piles gain energy. A pipeline that keeps only live bodies
-    /// also refuses an order in which a body lives too long, or too many bodies live at once, as
-    /// happens where collisions are sorted by body.
+    /// with any order that has hazards piles gain energy.
     pub order: Option<Order>,
     /// Whether to verify, before anything is sent, that no moving body recurs within the hazard
     /// window; a step with a hazard is refused. Without a choice of order, a pipeline that waits

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use pgs_interface::axi_dma::LENGTH_WIDTH_MIN;
-use pgs_interface::profile::{Flow, Variant};
+use pgs_interface::profile::Variant;
 use pgs_interface::record::Beat;
 
 use super::accelerator::Accelerator;
@@ -16,7 +16,6 @@ use crate::board::Guarded;
 use crate::board::plan::{Plan, bytes};
 use crate::board::symptom::Symptom;
 use crate::error::Error;
-use crate::order::{Ordered, Schedule};
 use crate::platform::{Deadline, GuardPlatform, PlatformError};
 use crate::scene::{Body, Collision, Passes, StepParameters};
 
@@ -98,20 +97,17 @@ impl Accelerator {
             }
         }
         let none: &[Collision] = &[];
-        let empty: Schedule = (0..plan.collisions).map(|_| None).collect();
-        let padding = Ordered { collisions: none, schedule: &empty };
         let input = PackInput {
             bodies: echo.bodies,
-            collisions: &padding,
-            added: Some(plan.collisions),
-            lives: None,
+            collisions: none,
+            added: None,
             shapes: &self.shapes,
             quick: None,
             kinematic: false,
         };
         let (sent, _) = self.device.pack(&plan, bank, &input);
         let parameters = StepParameters {
-            contact_iterations: plan.passes.contact,
+            contact_iterations: 0,
             friction_iterations: 0,
             integrate: false,
             deadline: Some(ECHO_LIMIT),
@@ -126,7 +122,7 @@ impl Accelerator {
         let channels = received(&self.device.s2mm, &plan, bank);
         Ok(EchoResult {
             results: channels[..plan.channels()].iter().map(|beats| beats.to_vec()).collect(),
-            sent: sent.velocities.wrapping_add(sent.collisions).wrapping_add(sent.poses),
+            sent: sent.velocities.wrapping_add(sent.poses),
             sums: counters.sums,
             interrupts,
             descriptors: self.device.descriptors(),
@@ -148,15 +144,9 @@ impl Accelerator {
     }
 }
 
-/// The plan of an echo: bodies alone. Where collisions have streams of their own, padding
-/// collisions let these streams carry something.
+/// The plan of an echo: bodies alone.
 fn plan(bodies: usize, variant: Variant) -> Plan {
-    let profile = variant.profile;
-    let (collisions, passes) = match profile.flow {
-        Flow::Passes => (0, 0),
-        Flow::Window(_) => (bodies.next_multiple_of(profile.collisions_per_issue as usize), 1),
-    };
-    let passes = Passes { contact: passes, ..Passes::default() };
+    let (collisions, passes) = (0, Passes::default());
     // The shapes of an echo fit every table, and it needs the poses.
     let (streamed_masses, velocities_only) = (false, false);
     Plan { bodies, collisions, passes, variant, streamed_masses, velocities_only }

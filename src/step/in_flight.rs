@@ -141,7 +141,6 @@ impl<'a> InFlight<'a> {
         let Self { accelerator, flight } = self;
         let PackedStep { plan, bank, order_summary, given, .. } = &flight.step;
         let Accelerator { device, orderings, staged, impulses, .. } = &mut **accelerator;
-        let lives = order_summary.live.map(|_| orderings[*bank].lives());
         let schedule = order_summary.scheduled.then(|| orderings[*bank].schedule());
         let collision_of =
             |entry| schedule.map_or(Some(entry), |schedule: &Schedule| schedule.get(entry));
@@ -149,7 +148,7 @@ impl<'a> InFlight<'a> {
         let (impulse_sum, broken) = impulses.read(plan, of_impulses, *given, collision_of);
         // A step that was not started has no sums.
         let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum);
-        read(device, staged, (plan, *bank), bodies, lives, (sent_sum, impulse_sum))?;
+        read(device, staged, (plan, *bank), bodies, (sent_sum, impulse_sum))?;
         if let Some(collision) = broken {
             return Err(Fault::ImpulseNotFinite { collision });
         }
@@ -203,8 +202,7 @@ impl<'a> InFlight<'a> {
         let PackedStep { order_summary, bank, .. } = &self.flight.step;
         if order_summary.scheduled {
             let ordering = &self.accelerator.orderings[*bank];
-            let lives = order_summary.live.map(|_| ordering.lives());
-            locate(&mut error, ordering.schedule(), lives);
+            locate(&mut error, ordering.schedule());
         }
         error
     }
@@ -222,7 +220,6 @@ impl<'a> InFlight<'a> {
             order_choice: order_summary.choice,
             empty: *empty as u64,
             verified: order_summary.verified,
-            live: order_summary.live,
             passes: u32::try_from(plan.passes.total()).unwrap_or(u32::MAX),
             cycles: StepCycles { total: counters.cycles, work, stalls, waits },
             clock_khz: self.accelerator.device.capabilities.clock_khz,

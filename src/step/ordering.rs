@@ -3,15 +3,13 @@
 //! The caller's own order needs no work: the collisions are packed as they are, those without
 //! contact points as padding. For another order this module reads pairs, positions and masses into
 //! memory that it keeps from step to step, orders the collisions, and verifies on request that no
-//! hazard is left. Where the board keeps only live bodies, every body then gets its place.
-
-use pgs_interface::profile::Flow;
+//! hazard is left.
 
 use super::report::OrderChoice;
 use crate::control_block::Capabilities;
 use crate::order::{
-    Checker, InputBuffers, Interlock, IssueWindow, LiveError, LiveReport, Lives, Order, OrderError,
-    OrderInput, OrderReport, Orderer, Room, Schedule,
+    Checker, InputBuffers, Interlock, IssueWindow, Order, OrderError, OrderInput, OrderReport,
+    Orderer, Schedule,
 };
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::validate::{Excess, InputError, Limits, SceneNeeds, needed};
@@ -22,7 +20,6 @@ pub(super) struct Ordering {
     buffers: InputBuffers,
     orderer: Orderer,
     checker: Checker,
-    lives: Lives,
 }
 
 /// The order of the collisions of a step, and the reason for it.
@@ -39,15 +36,13 @@ pub(super) struct OrderSummary {
     pub(super) empty: usize,
     /// The measured properties of the order, if it was to be verified.
     pub(super) verified: Option<OrderReport>,
-    /// The demand of the order on a design that keeps live bodies alone.
-    pub(super) live: Option<LiveReport>,
 }
 
 impl OrderSummary {
     /// The summary of collisions that are sent as the caller gives them.
     pub(super) const fn as_given(choice: OrderChoice) -> Self {
         let order = Order::AsGiven;
-        Self { order, choice, scheduled: false, empty: 0, verified: None, live: None }
+        Self { order, choice, scheduled: false, empty: 0, verified: None }
     }
 }
 
@@ -71,8 +66,7 @@ impl Ordering {
     /// indices in bodies and collisions were not, and are checked here.
     ///
     /// # Errors
-    /// [`Excess::OrderTooLong`], [`InputError::Order`]; where only live bodies are kept,
-    /// [`Excess::SpanTooLong`] and [`Excess::TooManyLive`].
+    /// [`Excess::OrderTooLong`], [`InputError::Order`].
     pub(super) fn order<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -80,37 +74,25 @@ impl Ordering {
         parameters: &StepParameters,
         context: OrderingContext<'_>,
     ) -> Result<OrderSummary, InputError> {
-        let design = context.capabilities.window;
         let (order, choice) = match OrderRequest::of(context.capabilities, parameters) {
             OrderRequest::Cheapest => {
                 return self.cheapest(bodies, collisions, parameters, context);
             }
-            OrderRequest::Order(Order::AsGiven, choice)
-                if !parameters.verify_order && design.is_none() =>
-            {
+            OrderRequest::Order(Order::AsGiven, choice) if !parameters.verify_order => {
                 return Ok(OrderSummary::as_given(choice));
             }
             OrderRequest::Order(order, choice) => (order, choice),
         };
-        let window = IssueWindow::of(context.capabilities, parameters)?;
-        let mut input = self.buffers.gather(bodies, collisions, context.shapes);
+        let window = IssueWindow::of(context.capabilities)?;
+        let input = self.buffers.gather(bodies, collisions, context.shapes);
         let empty = input.pairs.len() - input.collisions();
-        let passes = u32::try_from(parameters.passes().total()).unwrap_or(u32::MAX);
-        if design.is_some() && passes == 0 {
-            // Without a pass the board takes no collisions.
-            input.pairs = &[];
-        }
         self.orderer.set_limit(context.entries_max(input.moving.len()));
         match self.orderer.order(&input, order, window) {
             Ok(_) => {}
             Err(OrderError::TooLong { depth, limit, .. }) => {
-                return Err(too_long(&input, depth, limit, parameters, context.shapes));
+                return Err(too_long(&input, depth, limit, context.shapes));
             }
             Err(error) => return Err(error.into()),
-        }
-        if design.is_some() && order == Order::AsGiven {
-            // An entry without a collision would lengthen the lives of the bodies around it.
-            self.orderer.as_given_without_empty(&input);
         }
         let schedule = self.orderer.schedule();
         let verified = match parameters.verify_order {
@@ -120,19 +102,8 @@ impl Ordering {
             }
             false => None,
         };
-        let live = match design {
-            Some(design) => {
-                let room = Room::of(&design, passes, context.capabilities.collisions_per_issue);
-                let assigned = self.lives.assign_places(schedule, &input, room);
-                let report = self.lives.report();
-                assigned
-                    .map_err(|error| too_crowded(error, report, room, &input, context.shapes))?;
-                Some(report)
-            }
-            None => None,
-        };
         let order = self.orderer.made();
-        Ok(OrderSummary { order, choice, scheduled: true, empty, verified, live })
+        Ok(OrderSummary { order, choice, scheduled: true, empty, verified })
     }
 
     /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order that
@@ -147,7 +118,7 @@ impl Ordering {
         let input = self.buffers.gather(bodies, collisions, context.shapes);
         self.orderer.set_limit(context.entries_max(input.moving.len()));
         // A window that is too large for the orderer leaves the order as given.
-        let window = IssueWindow::of(context.capabilities, parameters).ok();
+        let window = IssueWindow::of(context.capabilities).ok();
         let pipeline = Interlock::of(context.capabilities, parameters);
         let costs = self.orderer.cheapest(&input, window, &pipeline)?;
         let (order, choice) = (self.orderer.made(), OrderChoice::Cheapest(costs));
@@ -158,17 +129,12 @@ impl Ordering {
             }
             self.orderer.as_given_without_empty(&input);
         }
-        Ok(OrderSummary { order, choice, scheduled: true, empty, verified: None, live: None })
+        Ok(OrderSummary { order, choice, scheduled: true, empty, verified: None })
     }
 
     /// The schedule of the last order.
     pub(super) fn schedule(&self) -> &Schedule {
         self.orderer.schedule()
-    }
-
-    /// Places, marks and orders of the bodies for the last schedule.
-    pub(super) fn lives(&self) -> &Lives {
-        &self.lives
     }
 }
 
@@ -183,17 +149,16 @@ enum OrderRequest {
 
 impl OrderRequest {
     fn of(capabilities: &Capabilities, parameters: &StepParameters) -> Self {
-        match (parameters.order, capabilities.window) {
-            (Some(order), _) => Self::Order(order, OrderChoice::Asked),
-            (None, Some(_)) => Self::Order(Order::HazardFree, OrderChoice::LiveBodies),
-            (None, None) if !capabilities.interlocked => {
+        match parameters.order {
+            Some(order) => Self::Order(order, OrderChoice::Asked),
+            None if !capabilities.interlocked => {
                 Self::Order(Order::HazardFreeNearby, OrderChoice::NoInterlock)
             }
             // Only an order that keeps its empty entries can be verified.
-            (None, None) if parameters.verify_order => {
+            None if parameters.verify_order => {
                 Self::Order(Order::HazardFreeNearby, OrderChoice::Asked)
             }
-            (None, None) => Self::Cheapest,
+            None => Self::Cheapest,
         }
     }
 }
@@ -207,20 +172,14 @@ pub(super) fn in_order_of_writing(
         Some(order) => order == Order::AsGiven,
         None => capabilities.interlocked,
     };
-    order && !parameters.verify_order && capabilities.window.is_none()
+    order && !parameters.verify_order
 }
 
 /// The error of an order without hazards that does not fit. The moving body with the most
 /// collisions decides which profiles could have room for it, because its uses must lie a depth
 /// apart there too.
 #[cold]
-fn too_long(
-    input: &OrderInput<'_>,
-    depth: u32,
-    limit: usize,
-    parameters: &StepParameters,
-    shapes: &[Shape],
-) -> InputError {
+fn too_long(input: &OrderInput<'_>, depth: u32, limit: usize, shapes: &[Shape]) -> InputError {
     let (bodies, collisions) = (input.moving.len(), input.collisions());
     let mut uses = vec![0_usize; bodies];
     for body in input.pairs.as_flattened() {
@@ -235,43 +194,12 @@ fn too_long(
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let excess = Excess::OrderTooLong { collisions, bodies, limit, depth, body, uses };
     needs.refuse(excess, |variant| {
-        let Ok(window) = IssueWindow::of_variant(variant, parameters) else { return false };
+        let Ok(window) = IssueWindow::of_variant(variant) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);
-        match variant.profile.flow {
-            Flow::Window(window) if of_body > window.lag as usize => return false,
-            _ => {}
-        }
         // An order that was longer than the limit here is not shorter at a greater depth.
         let as_here = if window.depth() >= depth { limit.saturating_add(1) } else { 0 };
         let entries = collisions.max(of_body).max(as_here);
         SceneNeeds { collisions: entries, ..needs }.has_room(variant)
-    })
-}
-
-/// The error of an order in which bodies live too long, or too many at once.
-#[cold]
-fn too_crowded(
-    error: LiveError,
-    LiveReport { most_alive: alive, longest_span, .. }: LiveReport,
-    room: Room,
-    input: &OrderInput<'_>,
-    shapes: &[Shape],
-) -> InputError {
-    let (bodies, collisions) = (input.moving.len(), input.collisions());
-    let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
-    let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
-    let (excess, held) = match error {
-        LiveError::SpanTooLong { body, first, last } => {
-            let (body, first, last) = (at(body), at(first), at(last));
-            (Excess::SpanTooLong { body, first, last, lag: room.lag }, 0)
-        }
-        LiveError::TooFewPlaces { held } => {
-            (Excess::TooManyLive { held, alive, places: room.places }, held)
-        }
-    };
-    needs.refuse(excess, |variant| match variant.profile.flow {
-        Flow::Passes => true,
-        Flow::Window(window) => window.lag > longest_span && window.slots > held,
     })
 }

@@ -81,14 +81,12 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
 
     /// Lays the step out over the channels.
     fn plan(&self, ordering: &Ordering, order_summary: &OrderSummary, device: &Device) -> Plan {
-        let lives = order_summary.live.map(|_| ordering.lives());
-        let bodies = lives.map_or(self.bodies.len(), |lives| lives.velocities().len());
-        let collisions = match lives {
+        let bodies = self.bodies.len();
+        let collisions = match bodies {
             // Nothing is streamed.
-            _ if bodies == 0 => 0,
-            Some(lives) => lives.words().len(),
-            None if order_summary.scheduled => ordering.schedule().len(),
-            None => self.collisions.len(),
+            0 => 0,
+            _ if order_summary.scheduled => ordering.schedule().len(),
+            _ => self.collisions.len(),
         };
         Plan {
             bodies,
@@ -111,16 +109,15 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
         let Self { bodies, collisions, shapes, .. } = *self;
         let kinematic = scene.kinematic;
         let quick = Quick::new(scene);
-        let (lives, quick) = (order_summary.live.map(|_| ordering.lives()), Some(&quick));
+        let quick = Some(&quick);
         if order_summary.scheduled {
             let schedule = ordering.schedule();
             let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
             let collisions = &Ordered { collisions, schedule };
-            let input = PackInput { bodies, collisions, added, lives, shapes, quick, kinematic };
+            let input = PackInput { bodies, collisions, added, shapes, quick, kinematic };
             device.pack(plan, bank, &input)
         } else {
-            let input =
-                PackInput { bodies, collisions, added: None, lives, shapes, quick, kinematic };
+            let input = PackInput { bodies, collisions, added: None, shapes, quick, kinematic };
             device.pack(plan, bank, &input)
         }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
-use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
+use crate::beat::pack::bodies::pack_bodies;
 use crate::beat::pack::collisions::{Entries, Seen, pack_collisions};
 use crate::beat::pack::impulses::{WarmSegments, WarmSums, pack_warm};
 use crate::beat::pack::target::Target;
@@ -14,7 +14,6 @@ use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
 use crate::board::port::Port;
-use crate::order::Lives;
 use crate::record::body_table::Survey;
 use crate::scene::{Bodies, Collisions, Shape, Velocity};
 use crate::validate::InputError;
@@ -38,7 +37,6 @@ pub(super) struct PackInput<'a, B: ?Sized, C: ?Sized> {
     pub(super) collisions: &'a C,
     /// Number of empty entries that the order added; `None` without a schedule.
     pub(super) added: Option<usize>,
-    pub(super) lives: Option<&'a Lives>,
     pub(super) shapes: &'a [Shape],
     /// Screens the input during packing.
     pub(super) quick: Option<&'a Quick<'a>>,
@@ -55,7 +53,7 @@ impl Device {
         bank: Bank,
         input: &PackInput<'_, B, C>,
     ) -> (SentSums, Seen) {
-        let PackInput { bodies, collisions, added, lives, shapes, quick, kinematic } = *input;
+        let PackInput { bodies, collisions, added, shapes, quick, kinematic } = *input;
         let SegmentBuffers { mut velocities, mut poses, mut entries, warm } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
@@ -65,24 +63,12 @@ impl Device {
             Target { variant: &plan.variant, shapes, streamed_masses: plan.streamed_masses, quick };
         let packers = &mut self.packers;
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
-        let (velocities, poses, bodies_passed) = match lives {
-            None => pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers),
-            Some(lives) => {
-                let passed = survey(target, bodies, bodies.len(), into, packers);
-                let (first, last) = (lives.velocities(), lives.results());
-                let [first, last] = [first, last].map(|order| Chosen { bodies, order });
-                let (velocities, first_passed) =
-                    pack_velocities(target, &first, plan.bodies, velocities, packers);
-                let (poses, last_passed) =
-                    pack_poses(target, &last, plan.bodies, poses.unwrap_or_default(), packers);
-                (velocities, poses, passed & first_passed & last_passed)
-            }
-        };
+        let (velocities, poses, bodies_passed) =
+            pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers);
         if kinematic {
             self.statics[bank].retain(|body| rests(bodies, *body));
         }
-        let words = lives.map(Lives::words);
-        let of_entries = Entries { collisions, count: plan.collisions, added, words };
+        let of_entries = Entries { collisions, count: plan.collisions, added };
         let (collisions, mut seen) =
             pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
         seen.good &= bodies_passed;

@@ -6,7 +6,7 @@ use pgs_interface::control::IMPULSE_SUM_MAX;
 
 use crate::control_block::time_of;
 use crate::control_block::{Saturated, impulse};
-use crate::order::{LiveReport, Order, OrderCosts, OrderReport};
+use crate::order::{Order, OrderCosts, OrderReport};
 
 /// Clock cycles of a step on the accelerator, by their use.
 ///
@@ -69,8 +69,6 @@ pub enum OrderChoice {
     Asked,
     /// The board does not wait on hazards. Only an order without hazards is solved right.
     NoInterlock,
-    /// The board keeps only live bodies on chip. The order keeps few bodies alive.
-    LiveBodies,
     /// The board waits on hazards. This order takes the fewest cycles of two: the order as given
     /// and the order without hazards.
     Cheapest(OrderCosts),
@@ -95,8 +93,6 @@ pub struct StepReport {
     /// The proof of the order, if it was to be [verified](crate::StepParameters::verify_order): no
     /// hazards, the number of bodies alive at once, and the length of their lives.
     pub verified: Option<OrderReport>,
-    /// The demand of the order on a bitstream that keeps only live bodies.
-    pub live: Option<LiveReport>,
     /// Passes over the collisions: contact and friction iterations.
     pub passes: u32,
     /// Clock cycles, as the accelerator counted them.
@@ -181,7 +177,6 @@ mod tests {
             order_choice: OrderChoice::Asked,
             empty: 0,
             verified: None,
-            live: None,
             passes: 0,
             cycles: StepCycles { total: work + stalls + waits, work, stalls, waits },
             clock_khz: 275_000,

@@ -10,14 +10,13 @@ use super::packing::SentSums;
 use crate::axi_dma::Direction;
 use crate::beat::pack::pool::PackPool;
 use crate::beat::stripe::Layout;
-use crate::beat::unpack::results::{BLOCK, Reader, read_all};
+use crate::beat::unpack::results::read_all;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
 use crate::board::port::Port;
 use crate::control_block::Counters;
 use crate::fault::Fault;
-use crate::order::Lives;
 use crate::record::finite::finite;
 use crate::record::result::{self, Record};
 use crate::scene::Bodies;
@@ -31,7 +30,7 @@ pub(super) fn check_received(
 ) -> Result<(), Fault> {
     let Some((received, _)) = counters.sums else { return Ok(()) };
     #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
-    let rounds = plan.rounds() as u32;
+    let rounds = plan.passes.total() as u32;
     let SentSums { velocities, collisions, warm, poses } = sent;
     let parts = [velocities, collisions.wrapping_mul(rounds), warm.contact, warm.friction, poses];
     let expected = parts.into_iter().fold(0, u32::wrapping_add);
@@ -44,14 +43,11 @@ pub(super) fn check_received(
 
 /// Reads the results of a bank into `staged`. Compares the driver's sum of the words, with `before` for
 /// the impulses, with `sent_sum`, the accelerator's sum of the words that it sent.
-///
-/// A board that keeps only live bodies sends the results in the order of `lives`.
 pub(super) fn read<B: Bodies + ?Sized>(
     device: &mut Device,
     staged: &mut Vec<Record>,
     (plan, bank): (&Plan, Bank),
     bodies: &B,
-    lives: Option<&Lives>,
     (sent_sum, before): (Option<u32>, u32),
 ) -> Result<(), Fault> {
     // A panic in the caller's code loses the memory: the next step allocates it anew.
@@ -60,10 +56,8 @@ pub(super) fn read<B: Bodies + ?Sized>(
     let channels = received(s2mm, plan, bank);
     let layout = plan.result_layout();
     let results = Results { layout: &layout, channels: &channels[..plan.channels()] };
-    let (found, broken) = match lives {
-        Some(lives) => results.read_scattered(lives.results(), bodies, &mut records),
-        None => results.read_in_order(plan.bodies, bodies, &statics[bank], &mut records, packers),
-    };
+    let (found, broken) =
+        results.read_in_order(plan.bodies, bodies, &statics[bank], &mut records, packers);
     *staged = records;
     let found = found.wrapping_add(before);
     match (sent_sum, broken) {
@@ -143,37 +137,6 @@ impl Results<'_> {
         let wrong = (0..).zip(&*into).filter(|(_, record)| !finite(record));
         (sum, wrong.map(|(index, _)| index).find(moves))
     }
-
-    /// Reads results in the order of the bodies in `order`, and leaves all other bodies as they
-    /// are; otherwise as [`Self::read_in_order`].
-    fn read_scattered<B: Bodies + ?Sized>(
-        self,
-        order: &[u32],
-        bodies: &B,
-        staged: &mut Vec<Record>,
-    ) -> (u32, Option<usize>) {
-        staged.clear();
-        staged.extend((0..bodies.len()).map(|index| unchanged(bodies, index)));
-        let mut broken: Option<usize> = None;
-        let mut reader = Reader::new(self.layout, self.channels);
-        let mut block = [Record::default(); BLOCK];
-        for order in order.chunks(BLOCK) {
-            let records = &mut block[..order.len()];
-            let all_finite = reader.read(records);
-            for (record, body) in records.iter().zip(order) {
-                let index = *body as usize;
-                if !all_finite && !finite(record) {
-                    broken = Some(broken.map_or(index, |lowest| lowest.min(index)));
-                }
-                // If the caller's bodies have become fewer, the results of the missing ones are
-                // dropped.
-                if let Some(to) = staged.get_mut(index) {
-                    *to = *record;
-                }
-            }
-        }
-        (reader.finish(), broken)
-    }
 }
 
 /// The record of a body's present state.
@@ -238,24 +201,6 @@ mod tests {
             for (index, record) in staged.iter().enumerate() {
                 let stays = record[POSITION].0[0] == 5.0_f32.to_bits();
                 assert_eq!(stays, statics.contains(&u32::try_from(index).expect("few")), "{index}");
-            }
-        }
-    }
-
-    #[test]
-    fn results_in_another_order_go_to_their_bodies_and_the_lowest_is_reported() {
-        // Body 39 first, down to body 5. The first five bodies have no results.
-        let order: Vec<u32> = (5..40).rev().collect();
-        for (broken, expected) in [(&[][..], None), (&[2], Some(37)), (&[33, 4, 2], Some(6))] {
-            let mut staged = Vec::new();
-            let (_, found) = with_broken(broken, |results, bodies| {
-                results.read_scattered(&order, bodies, &mut staged)
-            });
-            assert_eq!(found, expected, "{broken:?}");
-            for (index, record) in staged.iter().enumerate() {
-                assert_eq!(record[POSITION].0[0] != 0, index < 5, "{index}");
-                let result = order.iter().position(|body| *body as usize == index);
-                assert_eq!(!finite(record), result.is_some_and(|at| broken.contains(&at)));
             }
         }
     }

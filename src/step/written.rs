@@ -27,8 +27,7 @@ impl Accelerator {
     ///
     /// The board solves them in the order in which they are written. The parameters must ask for
     /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits
-    /// on hazards. A bitstream that keeps only live bodies wants all collisions at once, and so
-    /// does a step that is to verify its order.
+    /// on hazards. A step that is to verify its order wants all collisions at once.
     ///
     /// The step takes the place of the one that was started last; [`Self::start`] starts it. A step
     /// that is stepped or submitted before that start takes its place in turn, and the written step

@@ -83,7 +83,7 @@ mod tests {
     use super::super::tests::scene_on;
     use super::*;
     use crate::scene::{Pose, Velocity};
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile};
+    use pgs_interface::profile::{FLOAT, HALF, Profile};
 
     const MOVING: Body = Body {
         pose: Pose { position: [1.0, 2.0, 3.0], orientation: [0.0, 0.0, 0.0, 1.0] },
@@ -110,7 +110,7 @@ mod tests {
         body.pose.position = edge;
         assert_eq!(check_on(&HALF, &body), Ok(()));
         body.velocity.angular[1] = -65_504.0_f32.next_up();
-        assert_eq!(check_on(&MIXED, &body), Ok(()), "bodies are f32 there");
+        assert_eq!(check_on(&FLOAT, &body), Ok(()), "bodies are f32 there");
         let refused = check_on(&HALF, &body).expect_err("beyond binary16");
         let number = refused.out_of_range().expect("out of range");
         assert_eq!((number.item, number.field), (InputItem::Body(7), "angular velocity"));
@@ -119,7 +119,7 @@ mod tests {
             refused.to_string(),
             "body 7: angular velocity[1] is -65504.004, but this bitstream holds bodies in \
              binary16, which ends at 65504: bring it into range, or load another (profiles that \
-             could: naive, float, mixed, windowed)"
+             could: naive, float)"
         );
         body.velocity.angular[1] = f32::NAN;
         let refused = check_on(&HALF, &body).expect_err("no number");

@@ -104,10 +104,10 @@ mod tests {
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {
-        let all = ["naive", "float", "half", "mixed", "windowed", "windowed16"];
+        let all = ["naive", "float", "half"];
         assert_eq!(names(SMALL, |_| true), all);
         let text = SMALL.capable(|variant| variant.profile.name != "half").to_string();
-        assert_eq!(text, "profiles that could: naive, float, mixed, windowed, windowed16");
+        assert_eq!(text, "profiles that could: naive, float");
         assert_eq!(SMALL.capable(|_| false).to_string(), "no profile could");
         let world = SceneNeeds { inertia: Inertia::World, ..SMALL };
         let text = world.capable(|variant| variant.profile.id == 1).to_string();
@@ -120,19 +120,16 @@ mod tests {
 
     #[test]
     fn a_profile_without_room_for_the_scene_is_left_out() {
-        // 16-bit indices end at 65,535. A design that keeps live bodies alone takes 2^20 bodies.
+        // 16-bit indices end at 65,535.
         let bodies = |bodies| SceneNeeds { bodies, ..SMALL };
-        assert_eq!(names(bodies(65_536), |_| true).len(), 6);
-        let windowed = ["windowed", "windowed16"];
-        assert_eq!(names(bodies(65_537), |_| true), [["naive", "float"], windowed].concat());
-        assert_eq!(names(bodies(131_073), |_| true), windowed);
-        assert_eq!(names(bodies(1_048_577), |_| true), [""; 0]);
+        assert_eq!(names(bodies(65_536), |_| true).len(), 3);
+        assert_eq!(names(bodies(65_537), |_| true), ["naive", "float"]);
+        assert_eq!(names(bodies(131_073), |_| true), [""; 0]);
         // 4 MiB: 16 bytes a collision in f32, 8 in half.
         let collisions = |collisions| SceneNeeds { collisions, ..SMALL };
-        let and_half = ["half", "windowed", "windowed16"];
-        assert_eq!(names(collisions(300_000), |_| true), and_half);
+        assert_eq!(names(collisions(300_000), |_| true), ["half"]);
         // 48 bytes a body with world inertia in f32, 36 in half.
         let world = SceneNeeds { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
-        assert_eq!(names(world, |_| true), and_half);
+        assert_eq!(names(world, |_| true), ["half"]);
     }
 }

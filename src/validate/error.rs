@@ -60,11 +60,10 @@ pub enum InputError {
         announced: usize,
     },
 
-    /// Collisions that are written one by one cannot be reordered, verified or placed.
+    /// Collisions that are written one by one cannot be reordered or verified.
     #[error(
-        "collisions that are written one by one cannot be put into another order, verified, or \
-         placed on a bitstream that keeps live bodies alone: ask for the order as given, \
-         unverified, on one that takes it, or give all collisions at once (step, submit, prepare)"
+        "collisions that are written one by one cannot be put into another order or verified: ask \
+         for the order as given, unverified, or give all collisions at once (step, submit, prepare)"
     )]
     WrittenInOrder,
 

@@ -109,38 +109,6 @@ pub enum Excess {
         /// Its collisions.
         uses: usize,
     },
-
-    /// The span from the first to the last use of a body is longer than the delay lines.
-    #[error(
-        "in this order body {body} is used first in entry {first} and last in entry {last}, and the \
-         bitstream's delay lines take spans of less than {lag}: ask for another order (hazard-free \
-         keeps spans short unless a body has dozens of collisions), or load another bitstream"
-    )]
-    SpanTooLong {
-        /// The body with the longest span.
-        body: usize,
-        /// Entry of its first use.
-        first: usize,
-        /// Entry of its last use.
-        last: usize,
-        /// Length of the delay lines.
-        lag: u32,
-    },
-
-    /// More bodies are alive than the bitstream has places for.
-    #[error(
-        "in this order {held} moving bodies are on their way through the passes at once ({alive} of \
-         them with collisions to come), the bitstream has places for {places}: ask for \
-         another order, or load another bitstream"
-    )]
-    TooManyLive {
-        /// Most bodies that need a place at once.
-        held: u32,
-        /// Most bodies between their first and their last use.
-        alive: u32,
-        /// Places of the bitstream.
-        places: u32,
-    },
 }
 
 /// A number out of range, and its range.

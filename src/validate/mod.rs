@@ -34,11 +34,10 @@ use self::range::{Held, check_impulses, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
 use crate::control_block::Capabilities;
-use crate::record::relative::anchors;
 use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
 use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Precision, StreamFormat};
-use pgs_interface::profile::{Geometry, Variant};
+use pgs_interface::profile::Variant;
 
 /// The capacities and formats of a bitstream, as far as they limit the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -187,19 +186,15 @@ fn check_whole<'a>(
     let (body_a, body_b) =
         check_collision(index, collision, scene.needs.bodies, scene.pair_friction)?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
-    let (mut positions, shapes) = ([a, b], [shape_a, shape_b]);
+    let (positions, shapes) = ([a, b], [shape_a, shape_b]);
     let moves = shapes.map(|shape| !shape.is_static());
     if moves == [false, false] {
         let Collision { body_a, body_b, .. } = *collision;
         return Err(InputError::BothStatic { collision: index, body_a, body_b });
     }
-    // World coordinates in f32 are in range if they are finite, which is already checked.
-    let geometry = scene.variant.profile.geometry;
-    if scene.held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute {
+    // Coordinates in f32 are in range if they are finite, which is already checked.
+    if scene.held.collisions == StreamFormat::F32 {
         return Ok(());
-    }
-    if geometry == Geometry::Relative {
-        positions = anchors(positions, moves);
     }
     check_range(index, collision, positions, scene)?;
     if scene.variant.numbers.rows == Precision::Binary16 {
@@ -404,16 +399,13 @@ pub(crate) mod tests {
         assert_eq!(
             text,
             "found 131073 bodies, the bitstream takes at most 131072: give fewer, or load another \
-             (profiles that could: windowed, windowed16)"
+             (no profile could)"
         );
         // Indices of sixteen bits name fewer bodies.
         assert_eq!(room(65_536, 0, &HALF), Ok(()));
         let text = room(65_537, 0, &HALF).expect_err("one too many").to_string();
         assert!(text.contains("found 65537 bodies") && text.contains("at most 65536"), "{text}");
-        assert!(
-            text.ends_with("(profiles that could: naive, float, windowed, windowed16)"),
-            "{text}"
-        );
+        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
     }
 
     #[test]
@@ -433,7 +425,7 @@ pub(crate) mod tests {
         for number in ["38881", "203823", "4194312", "4194304", "203822"] {
             assert!(text.contains(number), "{text}");
         }
-        assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
+        assert!(text.ends_with("(profiles that could: half)"), "{text}");
     }
 
     #[test]
@@ -503,9 +495,6 @@ pub(crate) mod tests {
             refused.out_of_range().map(|number| (number.item, number.component))
         };
         assert_eq!(of(&refused), Some((InputItem::Body(1), 2)), "{refused}");
-        let refused = check(&bodies, &on(&profile::MIXED, Inertia::Isotropic));
-        let refused = refused.expect_err("body B is far from A");
-        assert_eq!(of(&refused), Some((InputItem::Collision(0, Some(0)), 2)), "{refused}");
     }
 
     /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them.
@@ -521,13 +510,7 @@ pub(crate) mod tests {
         let bodies = [body(0), body(1)];
         let refused = validate(&bodies[..], &collisions[..], &shapes, &parameters, &limits);
         let text = refused.expect_err("world inertia is needed").to_string();
-        assert!(
-            text.ends_with(
-                "(profiles that could, built with world inertia: half, \
-             windowed, windowed16)"
-            ),
-            "{text}"
-        );
+        assert!(text.ends_with("(profiles that could, built with world inertia: half)"), "{text}");
     }
 
     /// Every number of the collision fits binary16, and its effective mass does not.
@@ -543,7 +526,6 @@ pub(crate) mod tests {
         let refused = check(&HALF).expect_err("1 + 1.5 x 300^2");
         let of = refused.out_of_range().map(|number| (number.item, number.field));
         assert_eq!(of, Some((InputItem::Rows(0, Some(0)), "inverse effective mass")), "{refused}");
-        assert_eq!(check(&on(&profile::MIXED, Inertia::Isotropic)), Ok(()));
     }
 
     #[test]

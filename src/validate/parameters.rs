@@ -207,8 +207,7 @@ mod tests {
         assert_eq!(
             refused.to_string(),
             "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one with \
-             this extension of interface 1.2 (profiles that could: naive, float, half, \
-             mixed, windowed, windowed16)"
+             this extension of interface 1.2 (profiles that could: naive, float, half)"
         );
     }
 
@@ -236,7 +235,7 @@ mod tests {
             check(&parameters, &HALF),
             Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0, or \
                  5.9604645e-8 to 65504: correct the step parameters, or load another (profiles that \
-                 could: naive, float, mixed, windowed)"
+                 could: naive, float)"
                 .to_owned())
         );
         // The reciprocal of 10 us is 100,000.

@@ -9,7 +9,6 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use pgs_interface::number::{Precision, StreamFormat};
-use pgs_interface::profile::Geometry;
 use pgs_interface::record::LANES;
 
 use super::InputError;
@@ -49,9 +48,8 @@ impl<'a> Quick<'a> {
         let [velocities, poses] = [held.velocities, held.poses].map(StreamFormat::largest);
         let Largest([linear, angular]) = Largest::new(velocities, [any; 2]);
         let Largest([position, orientation]) = Largest::new(poses, [any, poses.to_bits()]);
-        let geometry = scene.variant.profile.geometry;
         let short_rows = scene.variant.numbers.rows == Precision::Binary16
-            && !(held.collisions == StreamFormat::F32 && geometry == Geometry::Absolute);
+            && held.collisions != StreamFormat::F32;
         Self {
             short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
             bodies: Largest([linear, angular, position, orientation]),

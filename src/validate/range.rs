@@ -2,10 +2,9 @@
 
 use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{Geometry, Variant};
+use pgs_interface::profile::Variant;
 
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
-use crate::record::relative::difference;
 use crate::scene::{CONTACT_POINTS, Collision, Contact, Impulses};
 
 /// The narrowest format of each input on its way through stream, arithmetic and array.
@@ -93,7 +92,7 @@ const VECTORS: usize = 3;
 /// `positions` belong to bodies A and B.
 ///
 /// [`check_collision`]: super::collision::check_collision
-// Not inlined: collisions in f32 and world coordinates never reach it.
+// Not inlined: collisions in f32 never reach it.
 #[inline(never)]
 pub(crate) fn check_range(
     index: usize,
@@ -113,37 +112,18 @@ pub(crate) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3
     let within = |vector: [f32; 3]| {
         (vector[0].abs() <= limit) & (vector[1].abs() <= limit) & (vector[2].abs() <= limit)
     };
-    let vectors = vectors(variant.profile.geometry, collision, positions);
+    let vectors = vectors(collision, positions);
     let mut fit = vectors.iter().fold(true, |fit, (_, vector)| fit & within(*vector));
-    let origin = origin(variant.profile.geometry, positions);
     for (ordinal, contact) in (0..).zip(&collision.contacts) {
-        let used = within(difference(contact.point, origin)) & (contact.distance.abs() <= limit);
+        let used = within(contact.point) & (contact.distance.abs() <= limit);
         fit &= used | (ordinal >= collision.count);
     }
     fit
 }
 
 /// The streamed vectors of a collision, contact points excluded: name and value.
-fn vectors(
-    geometry: Geometry,
-    collision: &Collision,
-    [a, b]: [[f32; 3]; 2],
-) -> [(&'static str, [f32; 3]); VECTORS] {
-    let normal = ("normal", collision.normal);
-    match geometry {
-        Geometry::Absolute => [normal, ("position of body A", a), ("position of body B", b)],
-        Geometry::Relative => {
-            [normal, ("offset of body B from body A", difference(b, a)), ("", [0.0; 3])]
-        }
-    }
-}
-
-/// The point that streamed contact points are relative to.
-pub(crate) fn origin(geometry: Geometry, [a, _]: [[f32; 3]; 2]) -> [f32; 3] {
-    match geometry {
-        Geometry::Absolute => [0.0; 3],
-        Geometry::Relative => a,
-    }
+fn vectors(collision: &Collision, [a, b]: [[f32; 3]; 2]) -> [(&'static str, [f32; 3]); VECTORS] {
+    [("normal", collision.normal), ("position of body A", a), ("position of body B", b)]
 }
 
 /// The used contact points.
@@ -160,19 +140,14 @@ fn refused(
     positions: [[f32; 3]; 2],
     scene: &Scene<'_>,
 ) -> InputError {
-    let geometry = scene.variant.profile.geometry;
     let format = scene.held.collisions;
     let limit = format.largest();
-    let point = match geometry {
-        Geometry::Absolute => "point",
-        Geometry::Relative => "lever arm of the point",
-    };
     let of_contacts = used(collision).iter().enumerate().flat_map(|(at, contact)| {
-        let [x, y, z] = difference(contact.point, origin(geometry, positions));
-        [(point, 0, x), (point, 1, y), (point, 2, z), ("distance", 0, contact.distance)]
+        let [x, y, z] = contact.point;
+        [("point", 0, x), ("point", 1, y), ("point", 2, z), ("distance", 0, contact.distance)]
             .map(|(field, component, found)| (Some(at), field, component, found))
     });
-    let (contact, field, component, found) = vectors(geometry, collision, positions)
+    let (contact, field, component, found) = vectors(collision, positions)
         .into_iter()
         .flat_map(|(field, [x, y, z])| {
             [(0, x), (1, y), (2, z)].map(|(component, found)| (None, field, component, found))
@@ -189,7 +164,7 @@ fn refused(
 mod tests {
     use super::super::tests::{UNUSED, USED, scene_on};
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, Profile, WINDOWED16};
+    use pgs_interface::profile::{FLOAT, HALF, Profile};
 
     const COLLISION: Collision = Collision {
         body_a: 0,
@@ -213,7 +188,7 @@ mod tests {
 
     #[test]
     fn what_the_format_still_carries_is_accepted_and_unused_points_do_not_matter() {
-        for profile in [&FLOAT, &HALF, &MIXED] {
+        for profile in [&FLOAT, &HALF] {
             assert_eq!(check(profile, &COLLISION, [[0.0; 3]; 2]), Ok(()));
         }
         let edge = far(Contact { point: [65_504.0, 0.0, -65_504.0], distance: 65_504.0 });
@@ -254,30 +229,14 @@ mod tests {
     }
 
     #[test]
-    fn relative_coordinates_are_held_against_it_from_body_a() {
-        // Far from the origin, close to each other.
-        let there = [1e6, 0.0, 0.0];
-        let near = Contact { point: [1e6 + 1.0, 2.0, 0.0], distance: -0.5 };
-        let collision = Collision { contacts: [near; 4], ..COLLISION };
-        assert_eq!(check(&MIXED, &collision, [there, there]), Ok(()));
-        let text = check(&HALF, &collision, [there, there]).expect_err("absolute").to_string();
+    fn a_refused_position_names_the_profiles_that_could() {
+        let far = [1e6, 0.0, 0.0];
+        let text = check(&HALF, &COLLISION, [far; 2]).expect_err("far").to_string();
         assert_eq!(
             text,
             "collision 7: position of body A[0] is 1000000, but this bitstream holds collisions \
              in binary16, which ends at 65504: bring it into range, or load another (profiles that \
-             could: naive, float, mixed, windowed, windowed16)"
-        );
-        // Body B is far from A.
-        let text = check(&MIXED, &collision, [there, [0.0; 3]]).expect_err("apart").to_string();
-        assert!(
-            text.starts_with("collision 7: offset of body B from body A[0] is -1000000"),
-            "{text}"
-        );
-        assert!(text.ends_with("(profiles that could: naive, float, windowed)"), "{text}");
-        let text = check(&MIXED, &collision, [[0.0; 3]; 2]).expect_err("a far point").to_string();
-        assert!(
-            text.starts_with("collision 7, contact point 0: lever arm of the point[0] is 1000001"),
-            "{text}"
+             could: naive, float)"
         );
     }
 
@@ -287,22 +246,20 @@ mod tests {
             check_impulses(7, impulses, &scene_on(&profile.default_variant(), false))
         };
         let beyond = 65_504.0_f32.next_up();
-        for profile in [&HALF, &MIXED] {
-            let edge = Impulses { normal: [0.0, -65_504.0, 0.0, 0.0], friction: [65_504.0; 2] };
-            assert_eq!(of(profile, &edge), Ok(()));
-            let far = Impulses { normal: [0.0, 0.0, 0.0, -beyond], ..edge };
-            let refused = of(profile, &far).expect_err("beyond");
-            let (item, field) = (InputItem::Collision(7, None), "normal impulse");
-            let (format, component) = (StreamFormat::Binary16, 3);
-            let (found, smallest, largest) = (-beyond, 0.0, 65_504.0);
-            let expected = OutOfRange { item, field, component, found, format, smallest, largest };
-            assert_eq!(refused.out_of_range(), Some(expected));
-            assert!(refused.to_string().ends_with("(profiles that could: naive, float)"));
-            assert_eq!(of(&FLOAT, &far), Ok(()));
-            let no_number = Impulses { friction: [f32::NAN, beyond], ..far };
-            let not_finite = InputError::ImpulseNotFinite { collision: 7 };
-            assert_eq!(of(profile, &no_number), Err(not_finite));
-        }
+        let edge = Impulses { normal: [0.0, -65_504.0, 0.0, 0.0], friction: [65_504.0; 2] };
+        assert_eq!(of(&HALF, &edge), Ok(()));
+        let far = Impulses { normal: [0.0, 0.0, 0.0, -beyond], ..edge };
+        let refused = of(&HALF, &far).expect_err("beyond");
+        let (item, field) = (InputItem::Collision(7, None), "normal impulse");
+        let (format, component) = (StreamFormat::Binary16, 3);
+        let (found, smallest, largest) = (-beyond, 0.0, 65_504.0);
+        let expected = OutOfRange { item, field, component, found, format, smallest, largest };
+        assert_eq!(refused.out_of_range(), Some(expected));
+        assert!(refused.to_string().ends_with("(profiles that could: naive, float)"));
+        assert_eq!(of(&FLOAT, &far), Ok(()));
+        let no_number = Impulses { friction: [f32::NAN, beyond], ..far };
+        let not_finite = InputError::ImpulseNotFinite { collision: 7 };
+        assert_eq!(of(&HALF, &no_number), Err(not_finite));
         let numbers = Numbers { impulses: Precision::Binary16, ..Numbers::F32 };
         assert_eq!(
             [&numbers, &Numbers::F32].map(|of| largest_impulse(of).to_bits()),
@@ -319,7 +276,6 @@ mod tests {
         };
         assert_eq!(held(&FLOAT.numbers), (F32, F32, F32));
         assert_eq!(held(&HALF.numbers), (Binary16, Binary16, Binary16));
-        assert_eq!(held(&MIXED.numbers), (F32, F32, Binary16));
         let short = Precision::Binary16;
         let with = |numbers| held(&numbers);
         let velocities = short;
@@ -330,6 +286,5 @@ mod tests {
         let thesis =
             Numbers { collisions: Thesis16, bodies: Thesis16, poses: Thesis16, ..HALF.numbers };
         assert_eq!(held(&thesis), (Thesis16, Thesis16, Thesis16));
-        assert_eq!(held(&WINDOWED16.numbers), (F32, Binary16, Binary16));
     }
 }

@@ -180,31 +180,15 @@ fn larger(one: f32, other: f32) -> f32 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::range::origin;
     use super::super::rows::Rows;
     use super::*;
-    use crate::record::relative::difference;
     use crate::scene::{Collision, Contact};
-    use pgs_interface::number::{Numbers, Precision};
-    use pgs_interface::profile::{Geometry, HALF, MIXED, Variant};
+    use pgs_interface::profile::HALF;
 
     const GROUND: Shape = Shape::STATIC;
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const PEBBLE: Shape = Shape::isotropic(8_000.0, 30_000.0);
     const POINT_MASS: Shape = Shape::isotropic(1.0, 0.0);
-
-    /// Computes rows in binary16, from records in world coordinates or relative to body A.
-    fn variant(geometry: Geometry) -> Variant {
-        match geometry {
-            Geometry::Absolute => HALF.default_variant(),
-            Geometry::Relative => {
-                let numbers = Numbers { rows: Precision::Binary16, ..MIXED.numbers };
-                Variant { numbers, ..MIXED.default_variant() }
-            }
-        }
-    }
-
-    const GEOMETRIES: [Geometry; 2] = [Geometry::Absolute, Geometry::Relative];
 
     /// A collision, the positions of its bodies, and the indices of their shapes.
     #[derive(Debug, Clone)]
@@ -215,12 +199,8 @@ mod tests {
     }
 
     impl One {
-        fn reach(&self, geometry: Geometry) -> Reach {
-            let origin = origin(geometry, self.positions);
-            let row = |vec3: [f32; 3], w: f32| {
-                let [x, y, z] = difference(vec3, origin);
-                Lanes::new([x, y, z, w].map(f32::to_bits))
-            };
+        fn reach(&self) -> Reach {
+            let row = |[x, y, z]: [f32; 3], w: f32| Lanes::new([x, y, z, w].map(f32::to_bits));
             // The word beside a vec3 may be anything.
             let positions = self.positions.map(|position| row(position, f32::NAN));
             let count = self.collision.count;
@@ -236,25 +216,25 @@ mod tests {
             self.shapes.map(|shape| &table[shape])
         }
 
-        fn surely_fits(&self, geometry: Geometry, table: &[Shape], flush: bool) -> bool {
-            surely_fit(&self.reach(geometry), self.shapes(table), flush)
+        fn surely_fits(&self, table: &[Shape], flush: bool) -> bool {
+            surely_fit(&self.reach(), self.shapes(table), flush)
         }
 
         /// The verdict of validation.
-        fn fits(&self, geometry: Geometry, table: &[Shape], flush: bool) -> bool {
+        fn fits(&self, table: &[Shape], flush: bool) -> bool {
             let (collision, positions) = (&self.collision, self.positions);
             let rows = Rows { index: 0, collision, positions, shapes: self.shapes(table) };
-            rows.fit(&variant(geometry), flush)
+            rows.fit(&HALF.default_variant(), flush)
         }
     }
 
-    fn together(all: &[One], geometry: Geometry, table: &[Shape], flush: bool) -> bool {
+    fn together(all: &[One], table: &[Shape], flush: bool) -> bool {
         let mut furthest = Furthest::new();
         for one in all {
             let still = one
                 .shapes(table)
                 .map(|shape| Lanes::all(if shape.is_static() { u32::MAX } else { 0 }));
-            furthest.take(&one.reach(geometry), still);
+            furthest.take(&one.reach(), still);
         }
         furthest.all_surely_fit(&Extremes::new(table, flush))
     }
@@ -271,9 +251,7 @@ mod tests {
         let table = [GROUND, CUBE];
         let on_ground = at([[0.0; 3], [100.0, 0.5, 90.0]], [100.5, 0.0, 90.5], [0, 1]);
         let above = at([[100.0, 0.5, 90.0], [100.0, 1.5, 90.0]], [100.5, 1.0, 90.5], [1, 1]);
-        for geometry in GEOMETRIES {
-            assert!(together(&[on_ground.clone(), above.clone()], geometry, &table, true));
-        }
+        assert!(together(&[on_ground.clone(), above.clone()], &table, true));
     }
 
     /// A pebble's inertia with a cube's arm does not fit, but no collision has both.
@@ -283,10 +261,8 @@ mod tests {
         let cubes = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [1, 1]);
         let pebbles = at([[5.0, 0.0, 0.0], [5.1, 0.0, 0.0]], [5.05, 0.0, 0.0], [2, 2]);
         let all = [cubes, pebbles];
-        for geometry in GEOMETRIES {
-            assert!(!together(&all, geometry, &table, false));
-            assert!(all.iter().all(|one| one.surely_fits(geometry, &table, false)));
-        }
+        assert!(!together(&all, &table, false));
+        assert!(all.iter().all(|one| one.surely_fits(&table, false)));
     }
 
     /// The sum of the four points is out of range, although the lever arms are short.
@@ -296,9 +272,9 @@ mod tests {
         for (x, fits) in [(7_000.0, true), (16_100.0, false), (-16_100.0, false)] {
             let far = at([[x, 0.0, 0.0]; 2], [x, 0.0, 0.0], [1, 1]);
             let near = at([[0.0; 3]; 2], [1.0, 0.0, 0.0], [0, 1]);
-            assert_eq!(far.fits(Geometry::Absolute, &table, false), fits);
-            assert_eq!(far.surely_fits(Geometry::Absolute, &table, false), fits);
-            assert_eq!(together(&[far, near], Geometry::Absolute, &table, false), fits);
+            assert_eq!(far.fits(&table, false), fits);
+            assert_eq!(far.surely_fits(&table, false), fits);
+            assert_eq!(together(&[far, near], &table, false), fits);
         }
     }
 
@@ -324,11 +300,9 @@ mod tests {
             rod.inverse_inertia[component] = 30_000.0;
             for (table, fits) in [([GROUND, CUBE], true), ([GROUND, rod], false)] {
                 let one = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [0, 1]);
-                for geometry in GEOMETRIES {
-                    assert_eq!(one.fits(geometry, &table, true), fits);
-                    assert_eq!(one.surely_fits(geometry, &table, true), fits);
-                    assert_eq!(together(std::slice::from_ref(&one), geometry, &table, true), fits);
-                }
+                assert_eq!(one.fits(&table, true), fits);
+                assert_eq!(one.surely_fits(&table, true), fits);
+                assert_eq!(together(std::slice::from_ref(&one), &table, true), fits);
             }
         }
     }
@@ -386,15 +360,13 @@ mod tests {
             }),
             flush in any::<bool>(),
         ) {
-            for geometry in GEOMETRIES {
-                let fits = |one: &One| one.fits(geometry, &table, flush);
-                if together(&all, geometry, &table, flush) {
-                    prop_assert!(all.iter().all(fits));
-                }
-                for one in &all {
-                    if one.surely_fits(geometry, &table, flush) {
-                        prop_assert!(fits(one));
-                    }
+            let fits = |one: &One| one.fits(&table, flush);
+            if together(&all, &table, flush) {
+                prop_assert!(all.iter().all(fits));
+            }
+            for one in &all {
+                if one.surely_fits(&table, flush) {
+                    prop_assert!(fits(one));
                 }
             }
         }

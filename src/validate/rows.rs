@@ -7,10 +7,9 @@
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
-use super::range::{fits, origin, used};
+use super::range::{fits, used};
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
-use crate::record::relative::difference;
-use crate::scene::{Collision, Contact, Shape};
+use crate::scene::{Collision, Shape};
 
 /// The longest component of a lever arm, m. A component of a moment is two products of lever arm
 /// and unit normal: at most sqrt(2) times this, which stays below 65504 with the roundings added.
@@ -51,14 +50,11 @@ impl Rows<'_> {
         if variant.numbers.rows == Precision::F32 {
             return true;
         }
-        let origin = origin(variant.profile.geometry, self.positions);
-        let positions = self.positions.map(|position| difference(position, origin));
         let mut fit = self.inverse_mass() >= 1.0 / LARGEST;
         let mut sum = [0.0; 3];
         for contact in used(self.collision) {
-            let point = difference(contact.point, origin);
-            sum = add(sum, point);
-            let arms = positions.map(|position| arm(point, position));
+            sum = add(sum, contact.point);
+            let arms = self.positions.map(|position| arm(contact.point, position));
             let [a, b] = arms;
             let short = a.iter().chain(&b).fold(true, |fit, arm| fit & (*arm <= LONGEST_ARM));
             fit &= short & (self.inverse_effective_mass(arms) <= largest(flush));
@@ -81,19 +77,14 @@ impl Rows<'_> {
     }
 
     /// Every number that has a limit, in the order of the record.
-    fn numbers(&self, variant: &Variant, flush: bool) -> Vec<Found> {
-        let origin = origin(variant.profile.geometry, self.positions);
-        let positions = self.positions.map(|position| difference(position, origin));
-        let points: Vec<_> = used(self.collision)
-            .iter()
-            .map(|Contact { point, .. }| difference(*point, origin))
-            .collect();
+    fn numbers(&self, flush: bool) -> Vec<Found> {
+        let points: Vec<_> = used(self.collision).iter().map(|contact| contact.point).collect();
         let smallest = 1.0 / LARGEST;
         let mass = self.inverse_mass();
         let mut numbers =
             vec![(None, "sum of the inverse masses", 0, mass, smallest, f32::INFINITY)];
         for (contact, point) in points.iter().enumerate() {
-            let arms = positions.map(|position| arm(*point, position));
+            let arms = self.positions.map(|position| arm(*point, position));
             let names = ["lever arm about body A", "lever arm about body B"];
             for (name, arm) in names.into_iter().zip(arms) {
                 for (component, found) in arm.into_iter().enumerate() {
@@ -116,7 +107,7 @@ impl Rows<'_> {
         let flush = scene.flush_subnormals;
         let (smallest, largest) = (1.0 / LARGEST, f32::INFINITY);
         let (contact, field, component, found, smallest, largest) = self
-            .numbers(scene.variant, flush)
+            .numbers(flush)
             .into_iter()
             .find(|(.., found, smallest, largest)| !(smallest..=largest).contains(&found))
             .unwrap_or((
@@ -159,8 +150,8 @@ fn add(sum: [f32; 3], point: [f32; 3]) -> [f32; 3] {
 mod tests {
     use super::super::tests::{UNUSED, scene_on};
     use super::*;
-    use pgs_interface::number::Numbers;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED};
+    use crate::scene::Contact;
+    use pgs_interface::profile::{FLOAT, HALF};
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
@@ -202,17 +193,14 @@ mod tests {
         let expected = "collision 7, contact point 1: inverse effective mass[0] is 66280.";
         assert!(text.starts_with(expected), "{text}");
         assert!(text.contains("in binary16, which takes 1.5625e-5 to 64000"), "{text}");
-        assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
+        assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
         // The sum over both bodies, each with its largest inverse inertia.
         assert_eq!(check([&GROUND, &CUBE], [150.0, 0.0, 0.0]), Ok(()));
         assert!(check([&CUBE, &CUBE], [150.0, 0.0, 0.0]).is_err());
         let flat = Shape { inverse_inertia: [0.1, 0.1, 1.5], ..Shape::isotropic(1.0, 0.0) };
         assert!(check([&GROUND, &flat], [0.0, 210.0, 0.0]).is_err());
-        for variant in [FLOAT.default_variant(), MIXED.default_variant()] {
-            let far = collision([0.0, 210.0, 0.0]);
-            let checked = check_on(variant, true, [&GROUND, &CUBE], &far, [[0.0; 3]; 2]);
-            assert_eq!(checked, Ok(()));
-        }
+        let (far, float) = (collision([0.0, 210.0, 0.0]), FLOAT.default_variant());
+        assert_eq!(check_on(float, true, [&GROUND, &CUBE], &far, [[0.0; 3]; 2]), Ok(()));
     }
 
     /// At 16 km, rounding of both ends may turn a lever arm of 1 m into 32 m.
@@ -225,8 +213,7 @@ mod tests {
             check_on(variant, false, [&light; 2], &near, [[16_000.0, 0.0, 0.0]; 2])
         };
         assert!(check(HALF_BUILT).is_err());
-        let numbers = Numbers { rows: Precision::Binary16, ..MIXED.numbers };
-        assert_eq!(check(Variant { numbers, ..MIXED.default_variant() }), Ok(()));
+        assert_eq!(check(FLOAT.default_variant()), Ok(()));
     }
 
     #[test]

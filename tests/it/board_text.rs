@@ -66,9 +66,9 @@ fn what_cannot_be_opened_says_why() {
     let cause = error.source().expect("a cause").to_string();
     assert!(cause.starts_with("\"quick\" is no option of a build: give one of "), "{cause}");
 
-    let error = open("windowed,unchecked").expect_err("a contradiction");
+    let error = open("float,binary16").expect_err("a contradiction");
     let Error::Open(OpenError::Emulation(cause)) = error else { panic!("{error:?}") };
-    assert!(matches!(cause, ConfigError::UncheckedWindow { .. }), "{cause}");
+    assert!(matches!(cause, ConfigError::StreamFormat { .. }), "{cause}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::common;
 use crate::common::{at_rest, bits, open, ordered};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards};
 use scene::{Scene, SceneOptions};
-use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
+use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE, Profile};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Body, Collision, Contact, OrderChoice, Shape, StepParameters, StepReport, Velocity,
@@ -112,9 +112,9 @@ fn compared(config: BoardConfig, scene: fn() -> (Vec<Body>, Vec<Collision>)) -> 
     [given, nearby, default]
 }
 
-/// Every profile that solves pass by pass, on a pipeline that waits.
+/// Every profile, on a pipeline that waits.
 fn waiting() -> impl Iterator<Item = BoardConfig> {
-    let profiles: [&'static Profile; 4] = [&NAIVE, &FLOAT, &HALF, &MIXED];
+    let profiles: [&'static Profile; 3] = [&NAIVE, &FLOAT, &HALF];
     profiles.into_iter().map(|profile| BoardConfig { profile, ..BoardConfig::default() })
 }
 
@@ -212,7 +212,6 @@ fn the_default_is_the_sequential_solve_of_its_order() {
 fn the_report_says_why_an_order_was_taken() {
     let choice = |config, parameters: &StepParameters| step(config, wall(), parameters).0;
     let unchecked = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
-    let windowed = BoardConfig { profile: &WINDOWED, ..BoardConfig::default() };
     let none = StepParameters::default();
     let report = choice(unchecked, &none);
     assert_eq!(
@@ -220,8 +219,6 @@ fn the_report_says_why_an_order_was_taken() {
         (Order::HazardFreeNearby, OrderChoice::NoInterlock)
     );
     assert!(report.empty > 0 && report.hazards == 0);
-    let report = choice(windowed, &none);
-    assert_eq!((report.order, report.order_choice), (Order::HazardFree, OrderChoice::LiveBodies));
     let report = choice(BoardConfig::default(), &ordered(Order::Colours));
     assert_eq!((report.order, report.order_choice), (Order::Colours, OrderChoice::Asked));
     // An order without hazards can be verified.

@@ -6,7 +6,7 @@ use crate::common::direct::direct_step;
 use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered, row};
 use bitstream_model::interface::extension::Extensions;
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE};
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
@@ -153,24 +153,6 @@ fn static_bodies_move_where_numbers_have_sixteen_bits() {
     assert_eq!(board.violations(), []);
 }
 
-#[test]
-fn a_profile_without_an_extension_names_the_ones_that_have_it() {
-    // Records of collisions give a static body the other one's position, or it has none.
-    for profile in [&MIXED, &WINDOWED] {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
-        let (_board, mut accelerator) = open_with(config, None, &both_inertias()[1]);
-        let (mut bodies, collisions) = row(3, 2.2, |_| Velocity::default());
-        let parameters = StepParameters::default().with_kinematic(true);
-        let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("no place");
-        assert_eq!(
-            error.to_string(),
-            "the step asks for static bodies that move, which this bitstream does not have: do without, \
-         or load one with this extension of interface 1.2 (profiles that could: naive, \
-         float, half)"
-        );
-    }
-}
-
 /// A static shape and 149 moving ones, each of another mass and inertia. The table has 64 entries.
 fn many_shapes() -> Vec<Shape> {
     let moving = (1..150_u8).map(f32::from).map(|number| Shape {
@@ -205,7 +187,7 @@ fn every_body_can_bring_a_mass_of_its_own() {
 #[test]
 fn a_streamed_mass_counts_as_one_of_the_table() {
     let (bodies, collisions) = with_shapes(5, 64);
-    for profile in [&FLOAT, &NAIVE, &MIXED] {
+    for profile in [&FLOAT, &NAIVE] {
         for shortcuts in [false, true] {
             let config =
                 BoardConfig { profile, shortcuts, inertia: Inertia::World, ..Default::default() };

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::common;
 use crate::common::bits;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, PROFILES, Profile};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, PROFILES, Profile};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 use scene::{Scene, SceneOptions};
@@ -160,7 +160,7 @@ fn a_step_in_the_sixteen_bits_of_the_thesis_is_the_same_in_every_environment() {
 /// written while the second is there, and one that is written while the board is idle. The narrow
 /// phase runs in the environment `outside`.
 fn overlapped(pile: &Pile, threads: usize, outside: Environment) -> [Outcome; 4] {
-    let (board, mut accelerator) = pile.open(of(&MIXED, Inertia::World), threads);
+    let (board, mut accelerator) = pile.open(of(&FLOAT, Inertia::World), threads);
     let Pile { bodies, collisions, .. } = pile;
     // A written step comes as given, and so does the prepared one, so that both are one step.
     let (parameters, part) = (common::ordered(Order::AsGiven), &collisions[..SEVERAL]);

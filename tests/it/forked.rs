@@ -2,6 +2,9 @@
 //! memory of its own alone, and disturbs neither its parent's board nor a step on it.
 #![cfg(feature = "emulation")]
 
+use bitstream_model::interface::address_map::MEMORY_BASE;
+use bitstream_model::remote::Server;
+use pgs_interface::message::MEMORY_UNIT;
 use pgs_support::in_forked_child;
 use zynq_pgs::{Accelerator, Body, Collision, Error, InFlight, Shape, StepParameters, Velocity};
 
@@ -160,4 +163,22 @@ fn a_forked_child_opens_a_board_of_its_own() {
         if step(&mut own).is_ok_and(|found| found == expected) { 7 } else { 1 }
     };
     assert_eq!(in_forked_child(in_child), Some(7));
+}
+
+/// A server without its socket would go on, and no driver could find it.
+#[test]
+fn a_server_keeps_its_socket_when_a_forked_child_drops_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let socket = folder.path().join("board");
+    let memory = MEMORY_BASE..MEMORY_BASE + MEMORY_UNIT;
+    let server = Server::bind(BoardConfig::default(), memory, &socket, None);
+    let mut server = Some(server.expect("served"));
+    let in_child = || {
+        drop(server.take());
+        7
+    };
+    assert_eq!(in_forked_child(in_child), Some(7));
+    assert!(socket.exists());
+    drop(server);
+    assert!(!socket.exists());
 }

@@ -159,8 +159,6 @@ fn control_registers_stand_at_their_published_offsets() {
             ("MEMORY_PER_RECORD", 0x13C),
             ("DMA", 0x140),
             ("NUMBERS", 0x144),
-            ("WINDOW", 0x148),
-            ("WINDOW_CAPACITY", 0x14C),
             ("FENCE_BASE", 0x150),
             ("FENCE_SIZE", 0x154),
             ("ERROR", 0x180),
@@ -273,8 +271,6 @@ fn error_codes_keep_their_numbers() {
             (8, ErrorCode::SelfCollision),
             (9, ErrorCode::Argument),
             (10, ErrorCode::PartialBeat),
-            (11, ErrorCode::EmptyPlace),
-            (12, ErrorCode::Deadlock),
         ]
     );
     for (code, known) in codes {
@@ -289,21 +285,16 @@ fn records_have_the_layout_of_the_record_table() {
     assert_eq!(record::CONTACT_POINTS, 4);
     assert_eq!((record::velocity::ROWS, record::velocity::WORLD_ROWS), (2, 4));
     assert_eq!((record::velocity::DIAGONAL, record::velocity::OFF_DIAGONAL), (2, 3));
-    assert_eq!(record::relative::ROWS, 6);
-    assert_eq!((record::relative::NORMAL, record::relative::OFFSET), (0, 1));
-    assert_eq!(record::relative::CONTACTS, 2);
     assert_eq!((record::velocity::LINEAR, record::velocity::ANGULAR), (0, 1));
     assert_eq!(record::collision::ROWS, 7);
     assert_eq!(record::collision::NORMAL, 0);
     assert_eq!((record::collision::BODY_A, record::collision::BODY_B), (1, 2));
     assert_eq!(record::collision::CONTACTS, 3);
     assert_eq!((record::collision::WARM_ROWS, record::collision::IMPULSES), (8, 7));
-    assert_eq!((record::relative::WARM_ROWS, record::relative::IMPULSES), (8, 6));
     assert_eq!(stripe::IMPULSES_STREAM, 0);
     let warm = |profile: &profile::Profile| profile.stripes.warm_collisions.map(|of| of.streams);
     assert_eq!(warm(&profile::FLOAT), Some(&[0, 1, 2, 3][..]));
     assert_eq!(warm(&profile::HALF), Some(&[0, 0, 0, 1, 1, 1, 2, 2][..]));
-    assert_eq!(warm(&profile::MIXED), Some(&[0, 1, 2, 2][..]));
     assert_eq!(record::pose::ROWS, 2);
     assert_eq!((record::pose::POSITION, record::pose::ORIENTATION), (0, 1));
     assert_eq!(record::result::ROWS, 4);
@@ -339,40 +330,33 @@ fn float_is_the_profile_of_the_thesis() {
 #[test]
 fn the_other_profiles_are_those_of_the_specification() {
     let by_name = |name| profile::Profile::by_name(name).expect("the profile exists");
-    let [naive, half, mixed] = ["naive", "half", "mixed"].map(by_name);
-    assert_eq!([naive.id, half.id, mixed.id], [2, 3, 4]);
+    let [naive, half] = ["naive", "half"].map(by_name);
+    assert_eq!([naive.id, half.id], [2, 3]);
+    // The numbers of profiles that are gone stay free.
+    assert!((4..8).all(|id| profile::Profile::by_id(id).is_none()));
     assert_eq!(naive.mm2s_widths, [32]);
     assert_eq!(half.mm2s_widths, [128, 128, 64]);
-    assert_eq!(mixed.mm2s_widths, [128; 3]);
-    for profile in [naive, half, mixed] {
+    for profile in [naive, half] {
         assert_eq!(profile.mm2s_widths, profile.s2mm_widths);
         assert_eq!((profile.contact.fill, profile.contact.window), (364, 316));
         assert_eq!((profile.friction.fill, profile.friction.window), (306, 182));
     }
-    assert_eq!([naive, half, mixed].map(|p| p.clock_khz), [275_000, 250_000, 250_000]);
+    assert_eq!([naive, half].map(|p| p.clock_khz), [275_000, 250_000]);
     let issue = |p: &profile::Profile| (p.initiation_interval, p.collisions_per_issue);
-    assert_eq!([naive, half, mixed].map(issue), [(28, 1), (3, 2), (1, 1)]);
+    assert_eq!([naive, half].map(issue), [(28, 1), (3, 2)]);
     let per_record = |p: &'static profile::Profile| {
         let variant = p.default_variant();
         (variant.bytes_per_body(), variant.bytes_per_collision())
     };
-    assert_eq!([naive, half, mixed].map(per_record), [(24, 16), (24, 8), (24, 16)]);
+    assert_eq!([naive, half].map(per_record), [(24, 16), (24, 8)]);
     let words = |p: &'static profile::Profile| {
         let words = p.default_variant().words();
         [words.velocity, words.collision, words.pose, words.result]
     };
-    assert_eq!([naive, half, mixed].map(words), [[8, 28, 8, 16], [4, 14, 4, 8], [8, 12, 8, 16]]);
+    assert_eq!([naive, half].map(words), [[8, 28, 8, 16], [4, 14, 4, 8]]);
     assert_eq!(half.stripes.collisions.streams, [0, 0, 0, 1, 1, 1, 2]);
     assert_eq!(half.stripes.results.streams, [0, 0, 1, 1, 2]);
     assert!(half.stripes.collisions.padded && half.stripes.results.padded);
-    let windowed = profile::Profile::by_id(5).expect("the profile exists");
-    let profile::Flow::Window(window) = windowed.flow else { panic!("collisions stream once") };
-    assert_eq!((windowed.name, window.slots, window.lag), ("windowed", 8192, 2816));
-    assert_eq!((window.contact_units, window.friction_units), (2, 2));
-    assert_eq!(profile::WINDOWED16.id, 6);
-    assert_eq!((window.slot_cycles(4, 4, 2, 1), window.slot_cycles(4, 4, 3, 2)), (4, 3));
-    let live = [record::live::PLACE, record::live::FIRST, record::live::LAST];
-    assert_eq!(live, [0x1FFF, 0x2000, 0x4000]);
     let mut world = profile::FLOAT.default_variant();
     world.inertia = profile::Inertia::World;
     assert_eq!((world.words().velocity, world.bytes_per_body()), (16, 48));

@@ -31,5 +31,4 @@ mod shapes;
 mod storage;
 mod warm_start;
 mod widths;
-mod windowed;
 mod without_poses;

@@ -11,7 +11,7 @@ use crate::common::{at_rest, bits, by_hand, open, ordered};
 use crate::vectors;
 use bitstream_model::{BoardConfig, Hazards};
 use scene::{Scene, SceneOptions, kinetic_energy};
-use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
+use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE, Profile};
 use zynq_pgs::order::{Order, OrderError, Ties};
 use zynq_pgs::{Body, Collision, Error, Excess, InputError, Shape, StepParameters, StepReport};
 
@@ -140,7 +140,7 @@ fn every_order_is_sent_on_every_design_and_none_moves_a_body_elsewhere() {
         Order::BodyByBody(Ties::Oldest),
         Order::BodyByBody(Ties::Newest),
     ];
-    let profiles: [&'static Profile; 4] = [&NAIVE, &FLOAT, &HALF, &MIXED];
+    let profiles: [&'static Profile; 3] = [&NAIVE, &FLOAT, &HALF];
     for profile in profiles {
         let config = BoardConfig { profile, ..BoardConfig::default() };
         for order in orders {
@@ -233,7 +233,7 @@ fn an_order_that_does_not_fit_is_refused_with_its_numbers() {
     );
     let text = error.to_string();
     // 1,999 x 12 + 1 entries at 28 cycles an entry; 1,999 x 106 x 2 + 1 at 3 cycles for two, of 8
-    // bytes each. Where the collisions are streamed once, no body lives so long.
+    // bytes each.
     assert!(text.ends_with("(profiles that could: naive, half)"), "{text}");
     assert_eq!(board.counts(), before, "not a register was touched");
     accelerator

@@ -198,8 +198,8 @@ fn board(number: usize) -> BoardConfig {
     match number {
         0 => BoardConfig::default(),
         1 => BoardConfig { length_width: 8, address_width: 64, ..BoardConfig::default() },
-        2 => BoardConfig { profile: profile("mixed"), ..BoardConfig::default() },
-        _ => BoardConfig { profile: profile("windowed"), ..BoardConfig::default() },
+        2 => BoardConfig { profile: profile("half"), ..BoardConfig::default() },
+        _ => BoardConfig { profile: profile("naive"), ..BoardConfig::default() },
     }
 }
 

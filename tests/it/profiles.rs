@@ -5,9 +5,7 @@
 use crate::common::{at_rest, bits, open, ordered, standing};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{
-    FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile,
-};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Profile};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
@@ -49,13 +47,9 @@ fn step(config: BoardConfig) -> Stepped {
     scene.detect();
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let (bodies, collisions) = scene.parts_mut();
-    // One order on every design that can have it: otherwise the results could not be compared.
-    let parameters = match config.profile.flow {
-        Flow::Passes => ordered(Order::AsGiven),
-        Flow::Window(_) => StepParameters::default(),
-    };
+    // One order on every design: otherwise the results could not be compared.
     let report = accelerator
-        .step(bodies, collisions, &parameters)
+        .step(bodies, collisions, &ordered(Order::AsGiven))
         .unwrap_or_else(|error| panic!("{error}: {:?}", board.violations()));
     drop(accelerator);
     assert_eq!(board.violations(), [], "{}", config.profile.name);
@@ -81,7 +75,7 @@ fn naive_gives_the_bits_of_float() {
 /// Cubes are the same about any axes: the tensors' zeros change no number but the sign of a zero.
 #[test]
 fn world_inertia_changes_nothing_for_cubes() {
-    for profile in [&NAIVE, &FLOAT, &MIXED] {
+    for profile in [&NAIVE, &FLOAT] {
         let world = BoardConfig { inertia: Inertia::World, ..of(profile) };
         let (position, velocity) = difference(&step(world).bodies, &step(of(profile)).bodies);
         assert!(position == 0.0 && velocity == 0.0, "{}: {position} {velocity}", profile.name);
@@ -98,8 +92,6 @@ fn sixteen_bits_stay_near_float() {
         assert!(p > 0.0 || v > 0.0, "{name}: sixteen bits that round nothing");
         assert!(p <= position && v <= velocity, "{name}: {p} m, {v} m/s");
     };
-    // Poses in f32: only offsets below 2 m are rounded, by 2^-11 of their value.
-    near(of(&MIXED), 1e-5, 1e-3);
     // Positions in binary16 are rounded by half of 2^-8 m at 4 to 8 m, on input and on output.
     near(of(&HALF), 4e-3, 1e-2);
     // Cut off: 2^-8 m each time.
@@ -111,13 +103,7 @@ fn sixteen_bits_stay_near_float() {
 fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
     for profile in PROFILES {
         let StepReport {
-            bodies,
-            collisions,
-            empty,
-            bytes_to_device,
-            bytes_from_device,
-            doorbells,
-            ..
+            bodies, collisions, bytes_to_device, bytes_from_device, doorbells, ..
         } = step(of(profile)).report;
         assert!(collisions % 2 == 1 || bodies % 5 != 0, "the pile needs padding");
         let five = |beats: u64| beats.next_multiple_of(5);
@@ -127,16 +113,6 @@ fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
             "half" => {
                 let pairs = collisions.div_ceil(2);
                 (2 * five(bodies) + 8 * 7 * pairs, five(2 * bodies), 3)
-            }
-            "mixed" => (4 * bodies + 8 * 3 * collisions, 4 * bodies, 3),
-            // All bodies but the ground, and every collision once.
-            "windowed" => {
-                let moving = bodies - 1;
-                (4 * moving + 6 * (collisions + empty), 4 * moving, 4)
-            }
-            "windowed16" => {
-                let moving = bodies - 1;
-                (3 * moving + 3 * (collisions + empty), 4 * moving, 4)
             }
             other => panic!("{other}: its bytes are not written down here"),
         };
@@ -209,20 +185,11 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "body 2: position[0] is 70000, but this bitstream holds bodies in binary16, which ends at \
-         65504: bring it into range, or load another (profiles that could: naive, float, mixed, \
-         windowed, windowed16)"
+         65504: bring it into range, or load another (profiles that could: naive, float)"
     );
     let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF) };
     assert!(
         refused(thesis, &mut bodies, &collisions).contains("bodies in thesis16, which ends at")
-    );
-    // Body A, the ground, is not counted, but its contact points have not moved.
-    let text = refused(of(&MIXED), &mut bodies, &collisions);
-    assert_eq!(
-        text,
-        "collision 1, contact point 0: lever arm of the point[0] is -70000.5, but this bitstream \
-         holds collisions in binary16, which ends at 65504: bring it into range, or load another \
-         (profiles that could: naive, float, windowed)"
     );
 }
 
@@ -253,7 +220,7 @@ fn a_contact_is_solved_or_refused_and_never_left_out() {
     let (mut bodies, collisions) = there(410.0);
     let text = refused(of(&HALF), &mut bodies, &collisions);
     assert!(text.starts_with("collision 0, contact point 0: inverse effective mass[0]"), "{text}");
-    assert!(text.ends_with("(profiles that could: naive, float, mixed, windowed)"), "{text}");
+    assert!(text.ends_with("(profiles that could: naive, float)"), "{text}");
 }
 
 #[test]
@@ -264,7 +231,7 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert_eq!(
         refused(of(&HALF), &mut bodies, &collisions),
         "found 65537 bodies, the bitstream takes at most 65536: give fewer, or load another \
-         (profiles that could: naive, float, windowed, windowed16)"
+         (profiles that could: naive, float)"
     );
     // 2 x 24 + 300,000 x 16 = 4,800,048 bytes; (4,194,304 - 48) / 16 = 262,141. The collisions
     // alone are beyond float's 262,144.
@@ -274,11 +241,11 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
         text.starts_with("found 300000 collisions, the bitstream takes at most 262144"),
         "{text}"
     );
-    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
-    let text = refused(of(&MIXED), &mut bodies, &vec![collisions[0]; 262_142]);
+    assert!(text.ends_with("(profiles that could: half)"), "{text}");
+    let text = refused(of(&FLOAT), &mut bodies, &vec![collisions[0]; 262_142]);
     assert!(text.contains("need 4194320 bytes") && text.contains("there are 4194304"), "{text}");
     assert!(text.contains("at most 262141 collisions fit"), "{text}");
-    assert!(text.ends_with("(profiles that could: half, windowed, windowed16)"), "{text}");
+    assert!(text.ends_with("(profiles that could: half)"), "{text}");
 }
 
 /// The encoder cuts three bits out of the exponent: a number too small for the format becomes large.

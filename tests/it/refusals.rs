@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::{at_rest, open_with};
 use bitstream_model::BoardConfig;
-use zynq_pgs::interface::profile::{FLOAT, Flow, HALF, MIXED, Profile, WINDOWED, WINDOWED16};
+use zynq_pgs::interface::profile::{FLOAT, HALF, PROFILES, Profile};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, Bodies, Body, Collision, Collisions, Contact, Error, InputError, Pose, Shape,
@@ -66,12 +66,8 @@ const MISTAKES: [Mistake; 13] = [
 #[test]
 fn a_refusal_is_the_same_before_packing_and_while_packing() {
     let (bodies, collisions) = scene();
-    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED] {
-        let orders = [Order::AsGiven, Order::HazardFree];
-        for order in orders.into_iter().filter(|order| {
-            // A board that keeps only live bodies needs the order in any case.
-            profile.name != "windowed" || *order == Order::HazardFree
-        }) {
+    for profile in PROFILES {
+        for order in [Order::AsGiven, Order::HazardFree] {
             let parameters = StepParameters::default().with_order(order);
             let mut warm = open(profile);
             let (mut expected, mut state) = (bodies.clone(), bodies.clone());
@@ -163,7 +159,7 @@ impl Collisions for WrongStructures {
 fn what_lies_nowhere_has_no_effect() {
     let (bodies, all) = scene();
     let parameters = StepParameters::default().with_order(Order::AsGiven);
-    for profile in [&FLOAT, &HALF, &MIXED] {
+    for profile in [&FLOAT, &HALF] {
         let mut expected = bodies.clone();
         open(profile).step(&mut expected, &all, &parameters).expect("a step");
         let mut one_less = all.clone();
@@ -193,10 +189,9 @@ fn what_lies_nowhere_has_no_effect() {
 #[test]
 fn what_is_wrong_at_one_look_alone_is_never_sent() {
     let (bodies, collisions) = scene();
-    for profile in [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16] {
+    for profile in [&FLOAT, &HALF] {
         // Ordering reads each element once before packing does.
-        let orders = [(Order::AsGiven, 1), (Order::HazardFree, 2)];
-        for (order, at_read) in orders.into_iter().skip(usize::from(profile.flow != Flow::Passes)) {
+        for (order, at_read) in [(Order::AsGiven, 1), (Order::HazardFree, 2)] {
             let parameters = StepParameters::default().with_order(order);
             let mut board = open(profile);
             let mut expected = bodies.clone();
@@ -224,16 +219,10 @@ fn what_is_wrong_at_one_look_alone_is_never_sent() {
             let wrong = Body { shape: 9, ..bodies[42] };
             let (list, reads) = (bodies.clone(), AtomicUsize::new(0));
             let mut unsteady = Unsteady { list, which: 42, wrong, at_read, reads };
-            // Where the board keeps only live bodies, the driver reads them once more for their
-            // velocities, and once more for their poses.
-            let further = if profile.flow == Flow::Passes { 0 } else { 2 };
-            for at_read in at_read..=at_read + further {
-                (unsteady.at_read, unsteady.reads) = (at_read, AtomicUsize::new(0));
-                let found = board.step(&mut unsteady, &collisions, &parameters);
-                let found = found.expect_err("one is wrong");
-                assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
-                assert_eq!(unsteady.list, bodies);
-            }
+            let found = board.step(&mut unsteady, &collisions, &parameters);
+            let found = found.expect_err("one is wrong");
+            assert!(matches!(found, Error::Input(InputError::Unsteady)), "{found:?}");
+            assert_eq!(unsteady.list, bodies);
             if order == Order::AsGiven {
                 // The same where the caller writes its collisions.
                 unsteady.reads = AtomicUsize::new(0);

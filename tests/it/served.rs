@@ -153,7 +153,7 @@ fn counted(report: &StepReport) -> [u64; 9] {
 
 #[test]
 fn a_served_board_gives_the_bits_and_the_cycles_of_one_in_this_process() {
-    for (profile, length_width) in [("float", 26), ("half", 14), ("naive", 26), ("windowed", 8)] {
+    for (profile, length_width) in [("float", 26), ("half", 14), ("naive", 8)] {
         let profile = Profile::by_name(profile).expect("a profile");
         let config = BoardConfig { profile, length_width, ..BoardConfig::default() };
         let own = EmulatedBoard::new(config).expect("a board that can be built");

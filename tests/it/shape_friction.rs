@@ -3,12 +3,12 @@
 
 use crate::common::{at_rest, bits, open_with, ordered, standing};
 use bitstream_model::interface::extension::Extensions;
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, Profile};
 use bitstream_model::{BoardConfig, FaultPlan};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, Velocity};
 
-const WITHOUT_ROOM: [&Profile; 2] = [&HALF, &MIXED];
+const WITHOUT_ROOM: [&Profile; 1] = [&HALF];
 
 /// The ground, and cubes of the shapes 1, 2.. that slide on it.
 fn sliding(cubes: u16) -> (Vec<Body>, Vec<Collision>) {
@@ -69,7 +69,7 @@ fn the_friction_of_a_collision_is_the_product_of_both_shapes() {
 fn a_reset_after_a_fault_restores_the_frictions() {
     let (bodies, collisions) = sliding(1);
     let shapes = [vec![Shape::STATIC], cubes(&[0.25])].concat();
-    let config = BoardConfig { profile: &MIXED, ..BoardConfig::default() };
+    let config = BoardConfig { profile: &HALF, ..BoardConfig::default() };
     let (board, mut accelerator) = open_with(config, None, &shapes);
     let mut expected = bodies.clone();
     accelerator.step(&mut expected, &collisions, &parameters()).expect("a good step");
@@ -95,7 +95,7 @@ fn a_board_that_has_no_frictions_of_shapes_refuses_the_step() {
         let error = accelerator.step(&mut bodies, &collisions, &parameters());
         let text = error.expect_err("no frictions").to_string();
         assert!(text.contains("a friction for each shape"), "{text}");
-        assert!(text.contains("profiles that could: half, mixed)"), "{text}");
+        assert!(text.contains("profiles that could: half)"), "{text}");
     }
 }
 
@@ -103,7 +103,7 @@ fn a_board_that_has_no_frictions_of_shapes_refuses_the_step() {
 fn frictions_of_more_shapes_than_the_table_holds_are_refused() {
     let (mut bodies, collisions) = sliding(1);
     let shapes = vec![Shape::isotropic(1.0, 1.5); 65];
-    let config = BoardConfig { profile: &MIXED, inertia: Inertia::World, ..BoardConfig::default() };
+    let config = BoardConfig { profile: &HALF, inertia: Inertia::World, ..BoardConfig::default() };
     let (_, mut accelerator) = open_with(config, None, &shapes);
     let error = accelerator.step(&mut bodies, &collisions, &parameters()).expect_err("65 shapes");
     let expected = InputError::FrictionsBeyondTable { found: 65, limit: 64 };

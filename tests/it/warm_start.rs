@@ -9,7 +9,7 @@ use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered};
 use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, WINDOWED};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE};
 use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan, Hazards};
 use half::f16;
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
@@ -178,9 +178,7 @@ fn a_warm_start_costs_a_pass_of_each_kind() {
     let (bodies, collisions) = scene(5);
     let collisions = &collisions[..219];
     // Cycles and beats of an issue.
-    for (profile, interval, beats) in
-        [(&FLOAT, 2, 8), (&NAIVE, 32, 8), (&HALF, 4, 8), (&MIXED, 2, 4)]
-    {
+    for (profile, interval, beats) in [(&FLOAT, 2, 8), (&NAIVE, 32, 8), (&HALF, 4, 8)] {
         let inertia = Inertia::World;
         let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
         let (_board, mut accelerator) = open_with(config, None, &shapes());
@@ -226,8 +224,7 @@ fn short_impulses(of: &Impulses) -> Impulses {
     Impulses { normal: of.normal.map(short), friction: of.friction.map(short) }
 }
 
-/// The world in numbers of binary16. Positions are multiples of 1/64 m, so that contact points relative to a
-/// body are numbers of binary16, too.
+/// The world in numbers of binary16. Positions are multiples of 1/64 m.
 fn short_world() -> (Vec<Body>, Vec<Collision>) {
     let (mut bodies, mut collisions) = world();
     let on_grid = |value: f32| (value * 64.0).round() / 64.0;
@@ -249,38 +246,6 @@ fn short_world() -> (Vec<Body>, Vec<Collision>) {
         }
     }
     (bodies, collisions)
-}
-
-/// Impulses go in as binary16 and are f32 from there on.
-#[test]
-fn impulses_of_mixed_are_solved_as_the_direct_solver_does() {
-    let (bodies, collisions) = short_world();
-    assert_eq!(collisions.len() % 2, 1);
-    let parameters = warm(Order::AsGiven).with_integrate(false);
-    for threads in [1, 2] {
-        let (profile, inertia) = (&MIXED, Inertia::World);
-        let config = BoardConfig { profile, inertia, threads, ..BoardConfig::default() };
-        let (board, mut accelerator) = open_with(config, None, &shapes());
-        let (mut found, mut expected) = (bodies.clone(), bodies.clone());
-        let mut given = vec![Impulses::ZERO; collisions.len()];
-        for step in 0..3 {
-            let warm = WarmCollisions { collisions: &collisions, impulses: &given };
-            accelerator.step(&mut found, &warm, &parameters).expect("a step");
-            let rounded: Vec<_> = given.iter().map(short_impulses).collect();
-            let out = direct_step_from(
-                Some(&rounded),
-                &mut expected,
-                &collisions,
-                &shapes(),
-                &parameters,
-            );
-            assert_eq!(bits(&found), bits(&expected), "step {step}");
-            assert_eq!(words(accelerator.impulses()), words(&out), "step {step}");
-            given = out.iter().map(|of| of.scaled(0.85)).collect();
-        }
-        assert!(given.iter().any(|of| short_impulses(of) != *of), "rounding matters");
-        assert_eq!(board.violations(), []);
-    }
 }
 
 /// `float` can compute in binary16 from words of f32: the driver's rounding is then the board's.
@@ -316,7 +281,7 @@ const BINARY16_ON_CHIP: Numbers =
 #[test]
 fn impulses_beyond_the_words_of_a_collision_are_refused() {
     let count = scene(5).1.len();
-    for (profile, inertia) in [(&HALF, Inertia::World), (&MIXED, Inertia::World)] {
+    for (profile, inertia) in [(&HALF, Inertia::World)] {
         let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
         let mut impulses = vec![Impulses::ZERO; count];
         impulses[17].friction[1] = -65_505.0;
@@ -336,7 +301,7 @@ fn impulses_beyond_the_words_of_a_collision_are_refused() {
 #[test]
 fn an_impulse_in_sixteen_bits_that_is_corrupted_on_its_way_fails_the_step() {
     let (bodies, collisions) = scene(5);
-    for profile in [&HALF, &MIXED] {
+    for profile in [&HALF] {
         let inertia = Inertia::World;
         let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
         let (board, mut accelerator) = open_with(config, None, &shapes());
@@ -393,11 +358,10 @@ fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
     let inertia = Inertia::World;
     let usual = BoardConfig { inertia, ..BoardConfig::default() };
     let old = BoardConfig { extensions: Extensions::NONE, ..usual };
-    let windowed = BoardConfig { profile: &WINDOWED, ..usual };
     // Words without a zero.
     let thesis = Numbers { collisions: StreamFormat::Thesis16, ..Numbers::BINARY16 };
     let without_zero = BoardConfig { profile: &HALF, numbers: Some(thesis), ..usual };
-    for config in [windowed, without_zero, old] {
+    for config in [without_zero, old] {
         for (parameters, asked) in [
             (ordered(Order::AsGiven).with_warm_start(true), "a warm start"),
             (ordered(Order::AsGiven).with_impulses_out(true), "the impulses of the collisions"),
@@ -409,7 +373,7 @@ fn boards_without_a_warm_start_refuse_it_and_name_the_profiles_that_can() {
                 "{found}"
             );
             let text = found.to_string();
-            assert!(text.contains("naive, float, half, mixed)"), "{text}");
+            assert!(text.contains("naive, float, half)"), "{text}");
         }
     }
 }

@@ -5,9 +5,7 @@ use crate::common::random_scene::{scene, shapes};
 use crate::common::{at_rest, bits, open_with, ordered, row};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::extension::Extensions;
-use bitstream_model::interface::profile::{
-    FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, Profile, WINDOWED,
-};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE, Profile};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Shape, StepParameters, StepReport, Velocity, Writer};
 
@@ -36,16 +34,14 @@ fn on_both(
         next.expect("it starts").wait(&mut second).expect("it ends");
         assert_eq!([bits(&first), bits(&second)], [bits(&whole), bits(&whole)]);
 
-        if matches!(config.profile.flow, Flow::Passes) {
-            let narrow_phase = |records: &mut Writer<'_>| {
-                collisions.iter().for_each(|collision| records.push(collision));
-            };
-            let count = collisions.len();
-            let step = accelerator.write(&written, count, parameters, narrow_phase);
-            let step = accelerator.start(&step.expect("it is packed")).expect("it starts");
-            step.wait(&mut written).expect("it ends");
-            assert_eq!(bits(&written), bits(&whole));
-        }
+        let narrow_phase = |records: &mut Writer<'_>| {
+            collisions.iter().for_each(|collision| records.push(collision));
+        };
+        let count = collisions.len();
+        let step = accelerator.write(&written, count, parameters, narrow_phase);
+        let step = accelerator.start(&step.expect("it is packed")).expect("it starts");
+        step.wait(&mut written).expect("it ends");
+        assert_eq!(bits(&written), bits(&whole));
         assert_eq!(board.violations(), []);
         (bits(&whole), report)
     })
@@ -73,7 +69,7 @@ fn a_step_that_integrates_nothing_moves_half_the_beats_of_the_bodies() {
         ..at_rest([1.0; 3], 1)
     };
     let parameters = ordered(Order::AsGiven).with_integrate(false);
-    for profile in [&FLOAT, &NAIVE, &HALF, &MIXED] {
+    for profile in [&FLOAT, &NAIVE, &HALF] {
         let config = BoardConfig { profile, ..BoardConfig::default() };
         for scene in [
             (vec![moving], Vec::new()),
@@ -114,7 +110,7 @@ fn other_extensions_work_without_poses() {
     }
     let frictions: Vec<Shape> = isotropic().into_iter().map(|it| it.with_friction(0.5)).collect();
     bodies[0].velocity = Velocity::default();
-    for profile in [&HALF, &MIXED] {
+    for profile in [&HALF] {
         let config = BoardConfig { profile, ..BoardConfig::default() };
         let scene = (bodies.clone(), collisions.clone());
         let parameters = solved.with_shape_friction(true);
@@ -124,11 +120,11 @@ fn other_extensions_work_without_poses() {
 }
 
 #[test]
-fn an_integrated_step_and_a_design_that_streams_once_keep_their_poses() {
+fn an_integrated_step_keeps_its_poses() {
     let scene = row(7, 3.0, |_| Velocity::default());
-    for (profile, integrate) in [(&FLOAT, true), (&WINDOWED, false)] {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
-        let parameters = ordered(Order::AsGiven).with_integrate(integrate);
+    {
+        let config = BoardConfig::default();
+        let parameters = ordered(Order::AsGiven);
         let [(found, new), (expected, old)] = on_both(config, &isotropic(), &scene, &parameters);
         assert_eq!(found, expected);
         assert_eq!(new.bytes_from_device, old.bytes_from_device);

@@ -38,7 +38,7 @@ check_c() {
 }
 
 pgs=$target_root/release/pgs
-for profile in naive float half mixed windowed windowed16; do
+for profile in naive float half; do
 	check "$pgs" run --board emulated --profile "$profile" --grid 2x2x2 --steps 2 >/dev/null
 	echo "memcheck: nothing found in 2 steps on $profile"
 done

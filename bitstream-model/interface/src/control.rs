@@ -138,26 +138,6 @@ pub mod numbers {
     pub const POSES: Field = Field::bits("poses", 24, 4, Access::ReadOnly);
 }
 
-/// Fields of WINDOW; all 0 in a design whose passes run one after the other.
-pub mod window {
-    use super::{Access, Field};
-
-    /// Units that run contact passes.
-    pub const CONTACT_UNITS: Field = Field::bits("contact_units", 0, 8, Access::ReadOnly);
-    /// Units that run friction passes.
-    pub const FRICTION_UNITS: Field = Field::bits("friction_units", 8, 8, Access::ReadOnly);
-}
-
-/// Fields of `WINDOW_CAPACITY`.
-pub mod window_capacity {
-    use super::{Access, Field};
-
-    /// Places for live bodies.
-    pub const SLOTS: Field = Field::bits("slots", 0, 16, Access::ReadOnly);
-    /// Collisions between one pass and the next.
-    pub const LAG: Field = Field::bits("lag", 16, 16, Access::ReadOnly);
-}
-
 /// Fields of CHANNELS.
 pub mod channels {
     use super::{Access, Field};
@@ -406,13 +386,6 @@ pub const NUMBERS: Register = read_only(
         numbers::POSES,
     ],
 );
-/// The units of a design that streams the collisions once.
-pub const WINDOW: Register =
-    read_only("WINDOW", 0x148, &[window::CONTACT_UNITS, window::FRICTION_UNITS]);
-/// Places and delay lines of a design that streams the collisions once.
-pub const WINDOW_CAPACITY: Register =
-    read_only("WINDOW_CAPACITY", 0x14C, &[window_capacity::SLOTS, window_capacity::LAG]);
-
 /// First byte of the [`Fence`](super::fence::Fence), in units of [`FENCE_UNIT`](super::fence::FENCE_UNIT).
 pub const FENCE_BASE: Register = read_only("FENCE_BASE", 0x150, &[]);
 /// Length of the fence, in the same units; 0: there is none.
@@ -511,8 +484,6 @@ pub const REGISTERS: &[Register] = &[
     MEMORY_PER_RECORD,
     DMA,
     NUMBERS,
-    WINDOW,
-    WINDOW_CAPACITY,
     FENCE_BASE,
     FENCE_SIZE,
     ERROR,
@@ -557,16 +528,11 @@ pub enum ErrorCode {
     Argument = 9,
     /// A beat with invalid bytes (TKEEP); detail: the beat within the packet.
     PartialBeat = 10,
-    /// A collision of a place that holds no body; detail: the collision.
-    EmptyPlace = 11,
-    /// Marks that can never be satisfied: a body's uses lie further apart than the delay lines are
-    /// long, or its place is never freed; detail: the collision that waits for ever.
-    Deadlock = 12,
 }
 
 impl ErrorCode {
     /// All codes.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 10] = [
         Self::BodyIndex,
         Self::ContactCount,
         Self::TlastEarly,
@@ -577,8 +543,6 @@ impl ErrorCode {
         Self::SelfCollision,
         Self::Argument,
         Self::PartialBeat,
-        Self::EmptyPlace,
-        Self::Deadlock,
     ];
 
     /// The code in the register's field; `None` for 0 and for unknown codes.
@@ -602,8 +566,6 @@ impl ErrorCode {
             Self::SelfCollision => "collision of a body with itself",
             Self::Argument => "argument out of range",
             Self::PartialBeat => "beat with invalid bytes",
-            Self::EmptyPlace => "collision of a place that holds no body",
-            Self::Deadlock => "collision that waits for a body for ever",
         }
     }
 }

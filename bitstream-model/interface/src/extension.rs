@@ -4,7 +4,7 @@
 
 use super::control::features;
 use super::number::StreamFormat;
-use super::profile::{Flow, Geometry, Inertia, Variant};
+use super::profile::{Inertia, Variant};
 use super::register::Field;
 
 /// The abilities of a bitstream beyond version 1.1.
@@ -86,21 +86,17 @@ impl Extensions {
     #[must_use]
     pub const fn possible(variant: &Variant) -> Self {
         let Variant { profile, numbers, inertia } = variant;
-        let absolute = matches!(profile.geometry, Geometry::Absolute);
-        let pair_friction = absolute && matches!(numbers.collisions, StreamFormat::F32);
+        let pair_friction = matches!(numbers.collisions, StreamFormat::F32);
         Self {
             spin_damping: true,
-            kinematic: matches!(profile.flow, Flow::Passes)
-                && absolute
-                && numbers.bodies.has_zero_and_infinity(),
+            kinematic: numbers.bodies.has_zero_and_infinity(),
             pair_friction,
             warm_start: profile.stripes.warm_collisions.is_some()
                 && numbers.collisions.has_zero_and_infinity(),
             streamed_masses: matches!(inertia, Inertia::World)
-                && matches!(profile.flow, Flow::Passes)
                 && matches!(numbers.bodies, StreamFormat::F32),
-            velocities_only: matches!(profile.flow, Flow::Passes),
-            shape_friction: !pair_friction && matches!(profile.flow, Flow::Passes),
+            velocities_only: true,
+            shape_friction: !pair_friction,
         }
     }
 

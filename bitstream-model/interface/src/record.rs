@@ -14,19 +14,12 @@
 //!             3  I.xy     I.xz     I.yz     0          inertia about world axes, and the inverse
 //!                                                      mass where masses are streamed
 //! collision   0  n.x      n.y      n.z      count
-//! (absolute)  1  pA.x     pA.y     pA.z     bodyA
+//!             1  pA.x     pA.y     pA.z     bodyA
 //!             2  pB.x     pB.y     pB.z     bodyB
 //!             3  c0.x     c0.y     c0.z     distance0
 //!             .. 6        up to four contact points
 //!             7  L0       L1       L2       L3         in a warm contact pass only
 //!             7  G0       G1       0        0          in a warm friction pass only
-//! collision   0  n.x      n.y      n.z      bodyA
-//! (relative)  1  r.x      r.y      r.z      bodyB      r = pB - pA
-//!             2  a0.x     a0.y     a0.z     distance0  a = c - pA
-//!             .. 5        up to four contact points; an unused one has distance +infinity
-//!             6  L0       L1       L2       L3         in a warm contact pass only
-//!             6  G0       G1       0        0          in a warm friction pass only
-//!             7  0        0        0        0          in a warm pass only
 //! pose        0  p.x      p.y      p.z      0
 //!             1  q.x      q.y      q.z      q.w
 //! result      0  p.x      p.y      p.z      0
@@ -79,7 +72,7 @@ pub mod velocity {
     pub const OFF_DIAGONAL: usize = 3;
 }
 
-/// The collision record in world coordinates: rows.
+/// The collision record: rows.
 pub mod collision {
     /// Rows of a record.
     pub const ROWS: usize = 7;
@@ -101,35 +94,6 @@ pub mod collision {
     pub const FRICTION_BITS: u32 = 0x7FFF_0000;
     /// The lowest of these bits.
     pub const FRICTION_SHIFT: u32 = 16;
-}
-
-/// The collision record relative to body A: rows.
-pub mod relative {
-    /// Rows of a record.
-    pub const ROWS: usize = 6;
-    /// Rows of a record of a warm pass. The last one is zeros: two rows of sixteen-bit words are a beat.
-    pub const WARM_ROWS: usize = 8;
-    /// In a warm pass, the impulses to begin with: four normal ones, or two of friction and zeros.
-    pub const IMPULSES: usize = 6;
-    /// Normal from B to A; the word beside it is the index of body A.
-    pub const NORMAL: usize = 0;
-    /// Position of body B less that of body A; the word beside it is the index of body B.
-    pub const OFFSET: usize = 1;
-    /// The first contact point less the position of body A; the word beside each is its distance,
-    /// +infinity where there is no point.
-    pub const CONTACTS: usize = 2;
-}
-
-/// The words beside normal and offset of a relative collision record, in a design that keeps live
-/// bodies only: the place of the body, and whether this is its first or last use.
-pub mod live {
-    /// The place of the body, in the low bits; 0 is every static body.
-    pub const PLACE: u32 = (1 << 13) - 1;
-    /// The body comes alive: its velocity is the next on the velocity stream.
-    pub const FIRST: u32 = 1 << 13;
-    /// The body's last collision of a pass: after the last pass it is integrated with the next pose
-    /// of the pose stream, A before B.
-    pub const LAST: u32 = 1 << 14;
 }
 
 /// The pose record: rows.

@@ -11,8 +11,6 @@
 //! half, collisions  0 0 0 1 1 1 2      a group is two records of three and a half beats
 //! half, warm        0 0 0 1 1 1 2 2    behind them a beat with the impulses of both
 //! half, bodies      0 0 1 1 2          two beats of a 128-bit stream last as long as one of 64
-//! mixed, collisions 0 1 2              a group is one record of three beats
-//! mixed, warm       0 1 2 2            behind it a beat with its impulses
 //! ```
 
 /// How the beats of an array are dealt out to the streams.

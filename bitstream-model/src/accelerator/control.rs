@@ -10,18 +10,17 @@ use pgs_interface::control::{
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
     MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS,
     SHAPE_CAPACITY, SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
-    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WINDOW,
-    WINDOW_CAPACITY, WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq,
-    issue, memory_per_record, numbers,
+    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES,
+    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
+    memory_per_record, numbers,
 };
 use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::Numbers;
-use pgs_interface::profile::{Depth, Inertia, Window};
+use pgs_interface::profile::{Depth, Inertia};
 
 use super::integrate::Integration;
 use super::solver::SolverParameters;
-use super::window;
 
 /// A counter of 32 bits, which saturates.
 fn counter(count: u64) -> u32 {
@@ -354,10 +353,9 @@ impl Registers {
             _ if offset == FRICTION_DEPTH.offset => pipeline(variant.friction()),
             _ if offset == CLOCK_KHZ.offset => profile.clock_khz,
             _ if offset == BODY_CAPACITY.offset => variant.body_capacity(),
-            _ if offset == COLLISION_CAPACITY.offset => memory
-                .bytes
-                .checked_div(variant.bytes_per_collision())
-                .unwrap_or(Window::COLLISIONS_MAX),
+            _ if offset == COLLISION_CAPACITY.offset => {
+                memory.bytes / variant.bytes_per_collision()
+            }
             _ if offset == SHAPE_CAPACITY.offset => profile.shape_capacity,
             _ if offset == MEMORY_BYTES.offset => memory.bytes,
             _ if offset == MEMORY_PER_RECORD.offset => memory_per_record::COLLISION.put(
@@ -367,8 +365,6 @@ impl Registers {
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
-            _ if offset == WINDOW.offset => window::units(&profile.flow),
-            _ if offset == WINDOW_CAPACITY.offset => window::capacity(&profile.flow),
             _ if offset == FENCE_BASE.offset => Fence::to_registers(config.fence)[0],
             _ if offset == FENCE_SIZE.offset => Fence::to_registers(config.fence)[1],
             _ if offset == ERROR.offset => self.error,

@@ -6,13 +6,13 @@
 //! ```
 //!
 //! `phases.rs` goes through load, passes and integration, `per_record.rs` is what happens to one
-//! record, `window` is the design that streams the collisions once. `records` says where rows lie in
+//! record. `records` says where rows lie in
 //! beats and beats on streams, `arithmetic` is that of the words; `control.rs` is the register file.
 //! The accelerator takes what has arrived on the streams, keeps account of the clock cycles that
 //! this costs, and knows nothing of who sent it.
 //!
 //! **Which code runs.** This folder is the reference: it computes a record when it takes it. By
-//! default a board of `float`, `half` or `mixed` is built with the short cuts of
+//! default a board of `float` or `half` is built with the short cuts of
 //! [`shortcut`](crate::shortcut), which take the records through the seam in `defer.rs` instead: a
 //! breakpoint in `solver.rs` is then hardly ever met. To see the reference run, switch them off:
 //! [`BoardConfig::shortcuts`]. Every bit, counter and cycle stays the same.
@@ -26,13 +26,12 @@ pub(crate) mod per_record;
 mod phases;
 pub(crate) mod records;
 pub(crate) mod solver;
-pub(crate) mod window;
 
 use crate::cast::register;
 use crate::config::BoardConfig;
 use crate::config::quirks::Resettable;
 use crate::fault::{
-    FaultKind, Faults, PassKind, Place, StepPhase, StepShape, Streamed, end_of_reset, pass_of,
+    FaultKind, Faults, PassKind, Place, StepPhase, StepShape, end_of_reset, pass_of,
 };
 use crate::memory::Memory;
 use crate::recording::{Stage, StageCounts, StageLog, StageSpan};
@@ -41,7 +40,7 @@ use crate::violation::{Log, ViolationKind};
 use pgs_interface::control::{
     BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
 };
-use pgs_interface::profile::{Flow, Inertia, Variant};
+use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use control::{Arguments, Counters, Registers, Request};
@@ -68,8 +67,6 @@ pub(crate) enum Phase {
     },
     /// In a step without poses the velocities go out.
     SendVelocities(Results),
-    /// All of it at once, in a design that streams the collisions once.
-    Window,
     /// The last results are on their way out.
     Ending,
     Failed,
@@ -111,7 +108,6 @@ pub(crate) struct Accelerator {
     pub(crate) impulses: Vec<Impulses>,
     /// The collisions of the issue under way in a warm pass; kept for its memory.
     warm_issue: Vec<Collision>,
-    window: Option<Box<window::Windowed>>,
     /// The stages of the step, while the board is recorded.
     stages: Option<Box<StageLog>>,
 }
@@ -143,7 +139,6 @@ impl Accelerator {
             inertias: Vec::new(),
             impulses: Vec::new(),
             warm_issue: Vec::new(),
-            window: None,
             stages: None,
         }
     }
@@ -272,7 +267,6 @@ impl Accelerator {
             }
             Phase::Integrate { .. } => Some(Stage::Integrate),
             Phase::SendVelocities(_) => Some(Stage::SendVelocities),
-            Phase::Window => Some(Stage::Window),
         };
         stages.note(stage, clock, counts);
     }
@@ -359,9 +353,6 @@ impl Accelerator {
                     self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
                 Phase::SendVelocities(results) => Ok(self.send_velocities(results, outputs)),
-                // The window has taken every beat that has arrived.
-                Phase::Window if ran.cycles > 0 => break,
-                Phase::Window => self.windowed(left, inputs, outputs),
                 Phase::Ending => {
                     self.phase = Phase::Idle;
                     self.end_step();
@@ -392,14 +383,12 @@ impl Accelerator {
     /// The packets of the step.
     fn step_shape(&self) -> StepShape {
         let segments = [self.velocities_in(), self.collisions_in(0), self.poses_in()];
-        let once = matches!(self.variant.profile.flow, Flow::Window(_));
         StepShape {
             segments: std::array::from_fn(|core| {
                 segments.each_ref().map(|segment| segment.beats_on(core) > 0)
             }),
             contact: self.arguments.contact_passes(),
             passes: self.arguments.passes(),
-            streamed: if once { Streamed::Once } else { Streamed::PerPass },
         }
     }
 
@@ -417,7 +406,6 @@ impl Accelerator {
                 return self.hung;
             }
             Phase::SendVelocities(_) => (Some(StepPhase::Results), None),
-            Phase::Window => (None, None),
             Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
             Phase::Pass { number, segment } => {
                 let pass = StepPhase::of_pass(*number, self.arguments.contact_passes());
@@ -427,7 +415,7 @@ impl Accelerator {
         };
         let (done, arrived) = match segment {
             Some(segment) => (segment.done, segment.done + segment.available(inputs)),
-            // All phases at once, or the last records: it is at every record.
+            // The last records: it is at every record.
             None => (0, usize::MAX),
         };
         if arrived == done {
@@ -488,10 +476,6 @@ impl Accelerator {
         }
         if needed > u64::from(profile.memory.bytes) {
             self.fail(ErrorCode::Capacity, 0, register(needed));
-            return;
-        }
-        if let Flow::Window(window) = &profile.flow {
-            self.start_window(window);
             return;
         }
         let bodies = arguments.bodies as usize;

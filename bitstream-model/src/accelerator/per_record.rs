@@ -1,5 +1,4 @@
-//! The work on one record, the same in both flows: a body as it comes in, a collision in one pass, a
-//! body as it leaves.
+//! The work on one record: a body as it comes in, a collision in one pass, a body as it leaves.
 
 use super::Accelerator;
 use super::arithmetic::inertia;

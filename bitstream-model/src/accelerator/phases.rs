@@ -17,8 +17,8 @@ use crate::memory::Memory;
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
-use pgs_interface::profile::{Depth, Geometry, Inertia, Variant};
-use pgs_interface::record::{CONTACT_POINTS, collision, pose, relative, result, velocity_result};
+use pgs_interface::profile::{Depth, Inertia, Variant};
+use pgs_interface::record::{CONTACT_POINTS, collision, pose, result, velocity_result};
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Collisions of a pass that have arrived, and for how many cycles they may enter.
@@ -60,10 +60,8 @@ impl Accelerator {
     pub(super) fn collisions_in(&self, pass: u32) -> Segment {
         let profile = self.variant.profile;
         let (stripe, rows) = match profile.stripes.warm_collisions {
-            Some(warm) if self.arguments.is_warm(pass) => {
-                (warm, self.variant.warm_collision_rows())
-            }
-            _ => (profile.stripes.collisions, self.variant.collision_rows()),
+            Some(warm) if self.arguments.is_warm(pass) => (warm, collision::WARM_ROWS),
+            _ => (profile.stripes.collisions, collision::ROWS),
         };
         let striping = Striping::new(&stripe, profile.mm2s_widths);
         let records = Records {
@@ -315,18 +313,8 @@ impl Accelerator {
         together.clear();
         together.extend((0..profile.collisions_per_issue).map(|_| self.collision(reader)));
         for collision in together {
-            let impulses = match profile.geometry {
-                Geometry::Absolute => {
-                    const _: () = assert!(collision::WARM_ROWS == collision::IMPULSES + 1);
-                    let [impulses] = reader.rows();
-                    impulses
-                }
-                Geometry::Relative => {
-                    const _: () = assert!(relative::WARM_ROWS == relative::IMPULSES + 2);
-                    let [impulses, _] = reader.rows();
-                    impulses
-                }
-            };
+            const _: () = assert!(collision::WARM_ROWS == collision::IMPULSES + 1);
+            let [impulses] = reader.rows();
             *collision = collision.with_impulses(format, impulses);
         }
     }
@@ -353,18 +341,14 @@ impl Accelerator {
     #[inline]
     pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
         use StreamFormat::{Binary16, F32, Thesis16, Thesis16Literal};
-        match (self.variant.profile.geometry, self.variant.numbers.collisions) {
-            (Geometry::Absolute, F32) if self.arguments.solver.pair_friction => {
+        match self.variant.numbers.collisions {
+            F32 if self.arguments.solver.pair_friction => {
                 Collision::with_friction(&reader.record())
             }
-            (Geometry::Absolute, F32) => Collision::absolute(F32, &reader.record()),
-            (Geometry::Absolute, Binary16) => Collision::absolute(Binary16, &reader.record()),
+            F32 => Collision::of(F32, &reader.record()),
+            Binary16 => Collision::of(Binary16, &reader.record()),
             // Words of both are read alike.
-            (Geometry::Absolute, Thesis16 | Thesis16Literal) => {
-                Collision::absolute(Thesis16, &reader.record())
-            }
-            (Geometry::Relative, Binary16) => Collision::relative(Binary16, &reader.record()),
-            (Geometry::Relative, format) => Collision::relative(format, &reader.record()),
+            Thesis16 | Thesis16Literal => Collision::of(Thesis16, &reader.record()),
         }
     }
 

@@ -1,7 +1,6 @@
 //! Configures an emulated board: the choices that a bitstream, a block design and a device tree fix
 //! on a real one.
 
-pub(crate) mod contradiction;
 pub(crate) mod quirks;
 
 use std::num::NonZero;
@@ -15,8 +14,8 @@ use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision};
-use pgs_interface::profile::{Depth, FLOAT, Flow, Geometry, Inertia, Profile, Variant};
-use pgs_interface::record::BEAT_BYTES;
+use pgs_interface::profile::{Depth, FLOAT, Inertia, Profile, Variant};
+use pgs_interface::record::{BEAT_BYTES, collision};
 use pgs_interface::stripe::Stripe;
 
 /// Upper limit of the beats in a group of a stripe.
@@ -207,15 +206,6 @@ pub enum ConfigError {
         /// Bits of the profile's format.
         expected: u32,
     },
-    /// A format without infinity, the distance of an unused contact point.
-    #[error(
-        "collisions relative to body A in {format}, which has no infinity to mark an unused contact \
-         point with; expected f32 or binary16"
-    )]
-    NoInfinity {
-        /// The format of the collisions.
-        format: &'static str,
-    },
     /// World inertia in a format without zero, which static bodies need.
     #[error(
         "world inertia in {format}, which has no zero for the inverse inertia of a static body; \
@@ -231,15 +221,6 @@ pub enum ConfigError {
          in f32, or both in binary16"
     )]
     RowsBeyondUpdates,
-    /// A design that streams the collisions once, without its scoreboard.
-    #[error(
-        "profile {name:?} built `unchecked`: its passes run side by side and always wait for their \
-         bodies; expected `interlocked`"
-    )]
-    UncheckedWindow {
-        /// The profile.
-        name: &'static str,
-    },
     /// A profile of the caller's own that contradicts itself.
     #[error("profile {name:?}: {what}")]
     Profile {
@@ -310,15 +291,6 @@ impl BoardConfig {
         range("threads of the host", self.threads as u64, 1, THREADS_MAX as u64)?;
         range("FIFO depth in beats", self.delays.fifo_beats as u64, 16, 1 << 20)?;
         check_profile(self.profile)?;
-        let name = self.profile.name;
-        if let Flow::Window(design) = &self.profile.flow {
-            if self.hazards == Hazards::Unchecked {
-                return Err(ConfigError::UncheckedWindow { name });
-            }
-            if let Some(what) = contradiction::contradiction(self.profile, design) {
-                return Err(ConfigError::Profile { name, what });
-            }
-        }
         self.check_numbers()?;
         self.check_sizes(range)?;
         range("address width", self.address_width.into(), 32, 64)?;
@@ -374,10 +346,6 @@ impl BoardConfig {
                 return Err(ConfigError::StreamFormat { stream, found, expected });
             }
         }
-        let relative = self.profile.geometry == Geometry::Relative;
-        if relative && !asked.collisions.has_zero_and_infinity() {
-            return Err(ConfigError::NoInfinity { format: asked.collisions.name() });
-        }
         if self.inertia == Inertia::World && !asked.bodies.has_zero_and_infinity() {
             return Err(ConfigError::NoZero { format: asked.bodies.name() });
         }
@@ -396,7 +364,7 @@ fn check_profile(profile: &'static Profile) -> Result<(), ConfigError> {
             && stripe.streams.iter().all(|stream| usize::from(*stream) < widths.len())
     };
     let stripes = &profile.stripes;
-    let rows = profile.default_variant().collision_rows() * profile.collisions_per_issue as usize;
+    let rows = collision::ROWS * profile.collisions_per_issue as usize;
     let issue_beats = rows / profile.numbers.collisions.rows_per_beat();
     let wrong = [
         (

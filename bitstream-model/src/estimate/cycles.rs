@@ -9,9 +9,10 @@
 //!
 //! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this project's.
 
+use super::designs::Window;
 use super::traffic::{Records, StepTraffic};
 use super::window::{WindowCycles, WindowStep};
-use pgs_interface::profile::{Flow, Profile, Variant};
+use pgs_interface::profile::{Profile, Variant};
 
 /// Size of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,11 +76,9 @@ impl StepCycles {
     #[must_use]
     pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
         let profile = variant.profile;
-        let window = match &profile.flow {
-            Flow::Window(design) => WindowCycles::new(variant, &WindowStep::longest(design, *step)),
-            Flow::Passes => None,
-        };
-        if let Some(window) = window {
+        let window = Window::of(profile);
+        let longest = window.map(|design| WindowStep::longest(design, *step));
+        if let Some(window) = longest.and_then(|step| WindowCycles::new(variant, &step)) {
             return Self {
                 load: 0,
                 pass: window.stream,
@@ -128,8 +127,9 @@ impl StepCycles {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::MIXED;
     use crate::estimate::thesis;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
     const THESIS_STEP: StepShape = thesis::step();
 

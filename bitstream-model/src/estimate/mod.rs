@@ -2,11 +2,12 @@
 //!
 //! The formulas give the cost of a step without stalls and waits, and without a run. The emulated
 //! board counts the same cycles, plus stalls and waits. All figures follow from the table of
-//! profiles ([`interface::profile`](pgs_interface::profile)); [`thesis`] holds the figures of the
-//! thesis, for comparison.
+//! profiles ([`interface::profile`](pgs_interface::profile)) and from three designs that are no
+//! boards ([`DESIGNS`]); [`thesis`] holds the figures of the thesis, for comparison.
 
 mod blocks;
 mod cycles;
+mod designs;
 mod host;
 mod ports;
 mod resources;
@@ -19,6 +20,7 @@ mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
 pub use cycles::{StepCycles, StepShape};
+pub use designs::{DESIGNS, MIXED, WINDOWED, WINDOWED16, Window, words};
 pub use host::{A53_COPIES, a53_copy_seconds};
 pub use ports::{LoadPorts, OnChipArray, PORTS, PortAccount, PortUse};
 pub use resources::{ArrayUse, MemoryUse};

@@ -29,10 +29,11 @@
 //! unevenly.
 
 use super::cycles::StepShape;
+use super::designs::Window;
 use super::schedule::Schedule;
 use super::traffic::{Records, StepTraffic};
 use super::window;
-use pgs_interface::profile::{Flow, Inertia, Variant};
+use pgs_interface::profile::{Inertia, Variant};
 
 /// Ports of a block RAM.
 pub const PORTS: u32 = 2;
@@ -171,9 +172,9 @@ impl PortAccount {
         // No other array needs copies or a pump.
         let plain = velocities.with(1, 1);
         let once = |array| PortUse { array, reads: 1, writes: 1, ..plain };
-        let mut arrays = match profile.flow {
-            Flow::Passes => vec![velocities, once(OnChipArray::Impulses)],
-            Flow::Window(_) => vec![
+        let mut arrays = match Window::of(profile) {
+            None => vec![velocities, once(OnChipArray::Impulses)],
+            Some(_) => vec![
                 PortUse { writes: 4, ..velocities },
                 once(OnChipArray::ContactLines),
                 once(OnChipArray::FrictionLines),
@@ -231,7 +232,7 @@ fn stream_interval(variant: &Variant) -> u32 {
     let step = StepShape::new(0, u64::from(issues) * u64::from(profile.collisions_per_issue));
     let traffic = StepTraffic::new(variant, Records::Streamed, &step);
     let mut entries = u64::from(issues);
-    if let Flow::Window(design) = &profile.flow {
+    if let Some(design) = Window::of(profile) {
         entries *= u64::from(window::issues_per_entry(design));
     }
     let interval = traffic.collisions.cycles.div_ceil(entries);
@@ -241,7 +242,8 @@ fn stream_interval(variant: &Variant) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, PROFILES, Profile};
+    use crate::estimate::{DESIGNS, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     fn account(profile: &'static Profile) -> PortAccount {
         PortAccount::new(&profile.default_variant())
@@ -257,7 +259,7 @@ mod tests {
         assert_eq!(both(&HALF), (3, 3));
         assert_eq!(both(&MIXED), (1, 1));
         assert_eq!(both(&NAIVE), (2, 28));
-        for profile in PROFILES {
+        for profile in DESIGNS {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let account = PortAccount::new(&variant);

@@ -3,9 +3,10 @@
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
 use super::blocks::{BLOCK_BITS, ShapedBlocks};
+use super::designs::Window;
 use super::ports::{OnChipArray, PortAccount};
 use super::window;
-use pgs_interface::profile::{Flow, Variant, Window};
+use pgs_interface::profile::Variant;
 
 /// Numbers of a velocity, and of a world inverse inertia.
 const SIX: u32 = 6;
@@ -82,10 +83,8 @@ impl MemoryUse {
                     OnChipArray::ContactLines | OnChipArray::FrictionLines => (0, 0),
                 };
                 let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
-                let of_window = match &variant.profile.flow {
-                    Flow::Window(design) => window::array(variant, design, array),
-                    Flow::Passes => None,
-                };
+                let design = Window::of(variant.profile);
+                let of_window = design.and_then(|design| window::array(variant, design, array));
                 if let Some(of) = of_window {
                     let (rows, row_bytes, copies) = (of.rows, of.row_bytes, of.memories);
                     return ArrayUse { array, rows, row_bytes, copies, simple };
@@ -94,10 +93,7 @@ impl MemoryUse {
             })
             .collect();
         let position = THREE * number * memory.velocity_copies;
-        let bodies = match &variant.profile.flow {
-            Flow::Passes => bodies,
-            Flow::Window(design) => design.slots.into(),
-        };
+        let bodies = Window::of(variant.profile).map_or(bodies, |design| design.slots.into());
         Self {
             arrays,
             capacity: memory.bytes.into(),
@@ -150,19 +146,20 @@ impl MemoryUse {
     /// collisions on chip, the pass counters are the limit.
     #[must_use]
     pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
-        let memory = variant.profile.memory;
+        if Window::of(variant.profile).is_some() {
+            return Window::COLLISIONS_MAX.into();
+        }
         let taken = bodies.saturating_mul(variant.bytes_per_body().into());
-        u64::from(memory.bytes)
-            .saturating_sub(taken)
-            .checked_div(u64::from(variant.bytes_per_collision()))
-            .unwrap_or(Window::COLLISIONS_MAX.into())
+        let free = u64::from(variant.profile.memory.bytes).saturating_sub(taken);
+        free / u64::from(variant.bytes_per_collision().max(1))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, PROFILES, Profile};
+    use crate::estimate::{DESIGNS, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, Profile};
 
     fn thesis_step(profile: &'static Profile) -> MemoryUse {
         MemoryUse::new(&profile.default_variant(), 38_880, 127_000)
@@ -206,7 +203,7 @@ mod tests {
 
     #[test]
     fn the_arrays_are_what_the_interface_counts_for_each_record() {
-        for profile in PROFILES.iter().filter(|profile| profile.flow == Flow::Passes) {
+        for profile in DESIGNS.iter().filter(|profile| Window::of(profile).is_none()) {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let memory = MemoryUse::new(&variant, 7, 5);

@@ -84,13 +84,14 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::DESIGNS;
     use crate::estimate::PortAccount;
-    use pgs_interface::profile::{HALF, Inertia, PROFILES, Variant};
+    use pgs_interface::profile::{HALF, Inertia, Variant};
 
     /// Counts from the slots alone, independently of the code that fills them.
     #[test]
     fn every_read_has_one_port_and_every_write_one_in_each_copy() {
-        for profile in PROFILES {
+        for profile in DESIGNS {
             let variant = Variant { inertia: Inertia::World, ..profile.default_variant() };
             for ports in PortAccount::new(&variant).arrays {
                 let schedule = ports.schedule();
@@ -127,7 +128,7 @@ mod tests {
     #[test]
     fn a_simple_array_never_has_two_accesses_of_a_kind_at_once() {
         let mut simple = 0;
-        for profile in PROFILES {
+        for profile in DESIGNS {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let account = PortAccount::new(&Variant { inertia, ..profile.default_variant() });
                 for ports in account.arrays.into_iter().filter(PortUse::simple) {

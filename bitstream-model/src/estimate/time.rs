@@ -5,10 +5,11 @@
 //! the passes run side by side, all records stream beside them and count in their part.
 
 use super::cycles::{StepCycles, StepShape};
+use super::designs::Window;
 use super::ports::PortAccount;
 use super::traffic::{Records, StepTraffic};
 use crate::config::Bandwidth;
-use pgs_interface::profile::{Flow, Variant};
+use pgs_interface::profile::Variant;
 
 /// The limit on the speed of a part of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +87,7 @@ impl StepTime {
             }
         };
         let last = traffic.poses.bytes.saturating_add(traffic.results.bytes);
-        let beside = variant.profile.flow != Flow::Passes;
+        let beside = Window::of(variant.profile).is_some();
         let (first, each, last) = if beside {
             (0, traffic.bytes(), 0)
         } else {
@@ -118,8 +119,8 @@ fn interval_limit(variant: &Variant) -> PartLimit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::thesis;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile};
+    use crate::estimate::{MIXED, thesis};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     const THESIS_STEP: StepShape = thesis::step();
 

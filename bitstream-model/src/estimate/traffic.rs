@@ -5,9 +5,10 @@
 //! the cycles of its busiest stream.
 
 use super::cycles::StepShape;
+use super::designs::{self, Window};
 use super::window;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::profile::{Flow, Geometry, Inertia, RecordWords, THESIS_WORDS, Variant};
+use pgs_interface::profile::{Inertia, RecordWords, THESIS_WORDS, Variant};
 use pgs_interface::record::{LANES, pose, result};
 use pgs_interface::stripe::Stripe;
 
@@ -118,10 +119,8 @@ fn packed_numbers(variant: &Variant) -> RecordWords {
         Inertia::Isotropic => 0,
         Inertia::World => INERTIA_NUMBERS,
     };
-    let collision = match variant.profile.geometry {
-        Geometry::Absolute => THESIS_WORDS.collision,
-        Geometry::Relative => RELATIVE_NUMBERS,
-    };
+    let relative = designs::is_relative(variant.profile);
+    let collision = if relative { RELATIVE_NUMBERS } else { THESIS_WORDS.collision };
     RecordWords { velocity: THESIS_WORDS.velocity + inertia, collision, ..THESIS_WORDS }
 }
 
@@ -148,10 +147,8 @@ impl StepTraffic {
         let (bodies, collisions) = (step.bodies, step.collisions);
         let formats = variant.numbers;
         let (to, from) = (profile.mm2s_widths, profile.s2mm_widths);
-        let collision_streams = match profile.flow {
-            Flow::Passes => step.passes(),
-            Flow::Window(_) => step.passes().min(1),
-        };
+        let once = Window::of(profile).is_some();
+        let collision_streams = if once { step.passes().min(1) } else { step.passes() };
         match records {
             Records::Packed => {
                 let numbers = packed_numbers(variant);
@@ -185,7 +182,7 @@ impl StepTraffic {
                     collisions: Transfer::streamed(
                         collisions,
                         profile.collisions_per_issue,
-                        variant.collision_rows(),
+                        designs::collision_rows(profile),
                         formats.collisions,
                         &profile.stripes.collisions,
                         to,
@@ -236,10 +233,7 @@ impl StreamDemand {
         let issue = StepTraffic::new(variant, Records::Streamed, &step).collisions;
         let clock = f64::from(profile.clock_khz) * 1e3;
         let ports = profile.mm2s_widths.len();
-        let issues = match &profile.flow {
-            Flow::Passes => 1,
-            Flow::Window(design) => window::issues_per_entry(design),
-        };
+        let issues = Window::of(profile).map_or(1, window::issues_per_entry);
         let cycles = profile.initiation_interval.saturating_mul(issues).max(1);
         Self {
             ports,
@@ -252,7 +246,8 @@ impl StreamDemand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
+    use crate::estimate::{DESIGNS, MIXED};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
     fn streamed(variant: &Variant, bodies: u64, collisions: u64) -> StepTraffic {
         StepTraffic::new(variant, Records::Streamed, &StepShape::new(bodies, collisions))
@@ -314,15 +309,12 @@ mod tests {
 
     #[test]
     fn no_count_overflows() {
-        for profile in pgs_interface::profile::PROFILES {
+        for profile in DESIGNS {
             for records in Records::ALL {
                 let step = StepShape::new(u64::MAX, u64::MAX);
                 let traffic = StepTraffic::new(&profile.default_variant(), records, &step);
-                let most = match profile.flow {
-                    Flow::Passes => u64::MAX,
-                    // The collisions stream once.
-                    Flow::Window(_) => u64::MAX / 8,
-                };
+                // Where the collisions stream once, the eighth part of the traffic of eight passes.
+                let most = if Window::of(profile).is_some() { u64::MAX / 8 } else { u64::MAX };
                 assert!(traffic.bytes() >= most, "{}", profile.name);
             }
         }

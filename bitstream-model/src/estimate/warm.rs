@@ -1,8 +1,8 @@
 //! The cost of a warm start: a pass more of each kind, and impulses in and out.
 
 use super::cycles::{StepCycles, StepShape};
+use super::designs;
 use super::traffic::{Records, StepTraffic, Transfer};
-use pgs_interface::extension::Extensions;
 use pgs_interface::profile::{Depth, Variant};
 use pgs_interface::record::BEAT_BYTES;
 
@@ -38,12 +38,10 @@ impl WarmCost {
     pub fn new(variant: &Variant, way: WarmStart, step: &StepShape) -> Option<Self> {
         let profile = variant.profile;
         let stripe = profile.stripes.warm_collisions?;
-        if !Extensions::possible(variant).warm_start {
-            return None;
-        }
         let records = |count| {
             let format = variant.numbers.collisions;
-            let (together, rows) = (profile.collisions_per_issue, variant.warm_collision_rows());
+            let (together, rows) =
+                (profile.collisions_per_issue, designs::warm_collision_rows(profile));
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let kinds = [
@@ -83,7 +81,8 @@ impl WarmCost {
 mod tests {
     use super::*;
     use crate::estimate::thesis;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED};
+    use crate::estimate::{MIXED, WINDOWED};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     const THESIS_STEP: StepShape = thesis::step();
 

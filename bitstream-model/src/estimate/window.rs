@@ -16,11 +16,12 @@
 //! kind.
 
 use super::cycles::StepShape;
+use super::designs::Window;
 use super::ports::OnChipArray;
 use super::thesis::recorded::{Design, FLOAT_DESIGN, HALF_DESIGN};
 use super::traffic::{Records, StepTraffic};
 use pgs_interface::number::Precision;
-use pgs_interface::profile::{Depth, Flow, Variant, Window};
+use pgs_interface::profile::{Depth, Variant};
 
 /// Words of a relative collision record, of its distances, and of its accumulated impulses.
 const RECORD_WORDS: u32 = 24;
@@ -85,7 +86,7 @@ impl WindowCycles {
     /// The formula for a variant of a profile; `None` if its passes run one after the other.
     #[must_use]
     pub fn new(variant: &Variant, step: &WindowStep) -> Option<Self> {
-        let Flow::Window(design) = &variant.profile.flow else { return None };
+        let design = Window::of(variant.profile)?;
         let profile = variant.profile;
         let shape = &step.shape;
         let slot = slot(variant, design, shape);
@@ -208,20 +209,24 @@ impl WindowLogic {
     /// The extrapolation; `None` for a design without a window.
     #[must_use]
     pub fn new(variant: &Variant) -> Option<Self> {
-        let Flow::Window(design) = &variant.profile.flow else { return None };
+        let design = Window::of(variant.profile)?;
+        Some(Self::of_units(variant, design))
+    }
+
+    fn of_units(variant: &Variant, design: &Window) -> Self {
         let from = match variant.numbers.updates {
             Precision::F32 => &FLOAT_DESIGN,
             Precision::Binary16 => &HALF_DESIGN,
         };
         let units = design.contact_units.max(design.friction_units);
         let times = |percent: u32| percent.saturating_mul(units);
-        Some(Self {
+        Self {
             from,
             units,
             dsp: times(from.dsp),
             flip_flops: times(from.flip_flops),
             lookup_tables: times(from.lookup_tables),
-        })
+        }
     }
 
     /// Whether the design fits the device.
@@ -234,8 +239,8 @@ impl WindowLogic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::{MemoryUse, PortAccount, StepCycles};
-    use pgs_interface::profile::{FLOAT, Profile, WINDOWED, WINDOWED16};
+    use crate::estimate::{MemoryUse, PortAccount, StepCycles, WINDOWED, WINDOWED16};
+    use pgs_interface::profile::{FLOAT, Profile};
 
     fn cycles(profile: &'static Profile, step: &WindowStep) -> WindowCycles {
         WindowCycles::new(&profile.default_variant(), step).expect("it has a window")
@@ -332,9 +337,7 @@ mod tests {
         assert_eq!((half.dsp, half.flip_flops, half.lookup_tables), (84, 58, 98));
         assert!(float.fits() && half.fits());
         let own = Window { contact_units: 3, friction_units: 2, slots: 8_192, lag: 2_816 };
-        let three: &'static Profile =
-            Box::leak(Box::new(Profile { flow: Flow::Window(own), ..WINDOWED }));
-        assert!(!logic(three).expect("it has a window").fits());
+        assert!(!WindowLogic::of_units(&WINDOWED.default_variant(), &own).fits());
         assert_eq!(logic(&FLOAT), None);
     }
 }

@@ -341,11 +341,9 @@ impl Faults {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fault::Streamed;
 
     fn shape() -> StepShape {
-        let streamed = Streamed::PerPass;
-        StepShape { segments: [[true; 3]; 4], contact: 4, passes: 8, streamed }
+        StepShape { segments: [[true; 3]; 4], contact: 4, passes: 8 }
     }
 
     #[test]

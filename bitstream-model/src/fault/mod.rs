@@ -25,7 +25,7 @@ use pgs_interface::control::ErrorCode;
 use crate::config::BoardConfig;
 
 pub(crate) use armed::{Due, Faults, PacketPosition};
-pub(crate) use shape::{PassKind, StepShape, Streamed, pass_of};
+pub(crate) use shape::{PassKind, StepShape, pass_of};
 pub use text::FaultError;
 
 /// The clock cycle at which a reset ends that begins `now`.

@@ -29,16 +29,6 @@ impl StepPhase {
     }
 }
 
-/// How often the collisions are streamed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Streamed {
-    /// Once for all passes.
-    Once,
-    /// Once a pass.
-    #[default]
-    PerPass,
-}
-
 /// The packets of a step: the segments of each channel, and the number of passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StepShape {
@@ -47,25 +37,12 @@ pub(crate) struct StepShape {
     pub(crate) contact: u32,
     /// Contact and friction passes together; 0 without collisions.
     pub(crate) passes: u32,
-    pub(crate) streamed: Streamed,
 }
 
 impl StepShape {
-    /// Number of times that the collisions are streamed.
-    fn rounds(&self) -> u32 {
-        match self.streamed {
-            Streamed::Once => self.passes.min(1),
-            Streamed::PerPass => self.passes,
-        }
-    }
-
     /// The phase whose records a packet of a channel carries.
     pub(super) fn phase(&self, core: usize, packet: u32) -> Option<StepPhase> {
-        let passes = (0..self.rounds()).map(|pass| match self.streamed {
-            // All passes, even in a step without contact passes.
-            Streamed::Once => StepPhase::Contact(1),
-            Streamed::PerPass => StepPhase::of_pass(pass, self.contact),
-        });
+        let passes = (0..self.passes).map(|pass| StepPhase::of_pass(pass, self.contact));
         let mut all = std::iter::once(StepPhase::Load).chain(passes).chain([StepPhase::Poses]);
         all.find(|phase| self.packet(core, *phase) == Some(packet))
     }
@@ -74,13 +51,7 @@ impl StepShape {
     pub(super) fn packet(&self, core: usize, phase: StepPhase) -> Option<u32> {
         let [load, collisions, poses] = *self.segments.get(core)?;
         let before = u32::from(load);
-        let pass = |number: u32, of: u32| {
-            let there = collisions && self.rounds() > 0;
-            match self.streamed {
-                Streamed::Once => there.then_some(before),
-                Streamed::PerPass => (there && number < of).then_some(before + number),
-            }
-        };
+        let pass = |number: u32, of: u32| (collisions && number < of).then_some(before + number);
         match phase {
             StepPhase::Load => load.then_some(0),
             StepPhase::Contact(number) => {
@@ -90,7 +61,7 @@ impl StepShape {
                 pass(self.contact.checked_add(number)?.checked_sub(1)?, self.passes)
             }
             StepPhase::Poses => {
-                let passes = if collisions { self.rounds() } else { 0 };
+                let passes = if collisions { self.passes } else { 0 };
                 poses.then_some(before + passes)
             }
             StepPhase::Results => None,
@@ -102,13 +73,13 @@ impl StepShape {
 mod tests {
     use super::*;
 
-    fn shape(contact: u32, passes: u32, streamed: Streamed) -> StepShape {
-        StepShape { segments: [[true; 3]; DMA_COUNT_MAX], contact, passes, streamed }
+    fn shape(contact: u32, passes: u32) -> StepShape {
+        StepShape { segments: [[true; 3]; DMA_COUNT_MAX], contact, passes }
     }
 
     #[test]
     fn phases_are_packets_of_a_channel() {
-        let shape = shape(4, 8, Streamed::PerPass);
+        let shape = shape(4, 8);
         let packet = |phase| shape.packet(1, phase);
         assert_eq!(packet(StepPhase::Load), Some(0));
         assert_eq!(packet(StepPhase::Contact(1)), Some(1));
@@ -124,25 +95,16 @@ mod tests {
     }
 
     #[test]
-    fn a_step_of_one_pass_is_not_one_that_streams_once() {
+    fn a_step_of_one_pass_or_none_has_as_many_packets() {
         let (contact, friction) = (StepPhase::Contact(1), StepPhase::Friction(1));
-        let one = shape(1, 1, Streamed::PerPass);
+        let one = shape(1, 1);
         assert_eq!([contact, friction].map(|phase| one.packet(0, phase)), [Some(1), None]);
         assert_eq!(one.phase(0, 1), Some(contact));
-        let one = shape(0, 1, Streamed::PerPass);
+        let one = shape(0, 1);
         assert_eq!([contact, friction].map(|phase| one.packet(0, phase)), [None, Some(1)]);
         assert_eq!(one.phase(0, 1), Some(friction));
-        let none = shape(0, 0, Streamed::PerPass);
+        let none = shape(0, 0);
         assert_eq!([contact, friction].map(|phase| none.packet(0, phase)), [None, None]);
         assert_eq!(none.phase(0, 1), Some(StepPhase::Poses));
-    }
-
-    #[test]
-    fn streamed_once_all_passes_are_one_packet() {
-        let mut once = shape(0, 4, Streamed::Once);
-        once.segments = [[false, true, false]; DMA_COUNT_MAX];
-        assert_eq!(once.packet(0, StepPhase::Friction(3)), Some(0));
-        assert_eq!(once.packet(0, StepPhase::Poses), None);
-        assert_eq!(once.phase(0, 0), Some(StepPhase::Contact(1)));
     }
 }

@@ -161,8 +161,6 @@ pub enum Stage {
     Integrate,
     /// Velocities come out.
     SendVelocities,
-    /// All of it at once, in a design that streams the collisions once.
-    Window,
 }
 
 /// A stage, its time and its part of the counters.

@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use nix::errno::Errno;
+use pgs_support::Process;
 use thiserror::Error;
 
 use super::connect::connect;
@@ -98,7 +99,8 @@ impl Stopper {
     }
 }
 
-/// A board at a socket. Dropping it removes the socket.
+/// A board at a socket. Dropping it removes the socket, but not in a child that the process has
+/// forked.
 #[derive(Debug)]
 pub struct Server {
     board: EmulatedBoard,
@@ -106,6 +108,7 @@ pub struct Server {
     pending: PendingConnections,
     path: PathBuf,
     stopper: Stopper,
+    opener: Process,
 }
 
 impl Server {
@@ -154,7 +157,7 @@ impl Server {
             visitor: Mutex::new(None),
         }));
         let pending = PendingConnections::new(listener).map_err(failed("shared"))?;
-        Ok(Self { board, memory, pending, path, stopper })
+        Ok(Self { board, memory, pending, path, stopper, opener: Process::this() })
     }
 
     /// The board, as its builder sees it.
@@ -224,6 +227,9 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
+        if !self.opener.is_this() {
+            return;
+        }
         if let Err(error) = fs::remove_file(&self.path) {
             log::error!("cannot remove the socket {}: {error}", self.path.display());
         }

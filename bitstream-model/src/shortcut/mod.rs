@@ -19,13 +19,11 @@ pub(crate) fn of(config: &BoardConfig) -> Option<Box<dyn ShortCut>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
     #[test]
     fn designs_that_are_known_have_short_cuts_unless_these_are_switched_off() {
-        for (profile, known) in
-            [(&FLOAT, true), (&HALF, true), (&MIXED, true), (&NAIVE, false), (&WINDOWED, false)]
-        {
+        for (profile, known) in [(&FLOAT, true), (&HALF, true), (&NAIVE, false)] {
             let config = BoardConfig { profile, ..BoardConfig::default() };
             assert_eq!(of(&config).is_some(), known, "{}", profile.name);
             assert!(of(&BoardConfig { shortcuts: false, ..config }).is_none(), "{}", profile.name);

@@ -3,8 +3,8 @@
 
 use half::f16;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::profile::{Geometry, Inertia, Variant};
-use pgs_interface::record::{BEAT_BYTES, Beat};
+use pgs_interface::profile::{Inertia, Variant};
+use pgs_interface::record::{BEAT_BYTES, Beat, collision};
 use pgs_interface::stripe::Stripe;
 
 use super::scene::{Body, Collision, Lane, Step};
@@ -106,30 +106,13 @@ pub(crate) fn collision_rows(variant: &Variant, collision: &Collision) -> Vec<Ro
     let [a, b] = collision.bodies;
     let [at_a, at_b] = collision.positions;
     let contact = |[x, y, z, distance]: [f32; 4]| row(format, [x, y, z], encode(format, distance));
-    match variant.profile.geometry {
-        Geometry::Absolute => {
-            let mut rows = vec![
-                row(format, collision.normal, collision.count),
-                row(format, at_a, a),
-                row(format, at_b, b),
-            ];
-            rows.extend(collision.contacts.map(contact));
-            rows
-        }
-        Geometry::Relative => {
-            let from_a = |[x, y, z]: [f32; 3]| [x - at_a[0], y - at_a[1], z - at_a[2]];
-            let mut rows = vec![row(format, collision.normal, a), row(format, from_a(at_b), b)];
-            rows.extend((0..4).zip(collision.contacts).map(|(k, [x, y, z, distance])| {
-                if k < collision.count {
-                    let [x, y, z] = from_a([x, y, z]);
-                    contact([x, y, z, distance])
-                } else {
-                    contact([0.0, 0.0, 0.0, f32::INFINITY])
-                }
-            }));
-            rows
-        }
-    }
+    let mut rows = vec![
+        row(format, collision.normal, collision.count),
+        row(format, at_a, a),
+        row(format, at_b, b),
+    ];
+    rows.extend(collision.contacts.map(contact));
+    rows
 }
 
 pub(crate) fn pose_rows(format: StreamFormat, body: &Body) -> [Row; 2] {
@@ -152,7 +135,7 @@ impl Step {
             record[0][3] |= u32::from(f16::from_f32(*friction).to_bits()) << 16;
         }
         let mut collisions = records.concat();
-        let issue = profile.collisions_per_issue as usize * variant.collision_rows();
+        let issue = profile.collisions_per_issue as usize * collision::ROWS;
         collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
         let with_poses = self.bodies.iter().filter(|_| !self.velocities_only);
         let poses: Vec<Row> = with_poses.flat_map(|body| pose_rows(numbers.poses, body)).collect();
@@ -162,18 +145,16 @@ impl Step {
             let stripe = stripes.warm_collisions.filter(|_| !self.impulses.is_empty());
             let Some(stripe) = stripe else { return vec![Vec::new(); streams] };
             let together = profile.collisions_per_issue as usize;
-            let behind = variant.warm_collision_rows() - variant.collision_rows();
             let mut rows = Vec::new();
             for (records, impulses) in records.chunks(together).zip(self.impulses.chunks(together))
             {
                 let padding = together - records.len();
                 rows.extend(records.iter().flatten());
-                rows.extend(vec![[0; 4]; padding * variant.collision_rows()]);
+                rows.extend(vec![[0; 4]; padding * collision::ROWS]);
                 for impulses in impulses {
                     rows.push(impulses[kind].map(|impulse| encode(numbers.collisions, impulse)));
-                    rows.extend(vec![[0; 4]; behind - 1]);
                 }
-                rows.extend(vec![[0; 4]; padding * behind]);
+                rows.extend(vec![[0; 4]; padding]);
             }
             deal(&stripe, streams, beats(numbers.collisions, &rows))
         };
@@ -243,7 +224,7 @@ impl Step {
 /// Cycles from one issue of a warm pass to the next.
 fn warm_interval(variant: &Variant) -> u64 {
     let Variant { profile, numbers, .. } = *variant;
-    let rows = profile.collisions_per_issue as usize * variant.warm_collision_rows();
+    let rows = profile.collisions_per_issue as usize * collision::WARM_ROWS;
     let issue = beats(numbers.collisions, &vec![[0; 4]; rows]);
     let stripe = profile.stripes.warm_collisions.expect("a stripe");
     let dealt = deal(&stripe, profile.mm2s_widths.len(), issue);

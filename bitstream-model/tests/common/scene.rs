@@ -196,8 +196,7 @@ impl Step {
 
     /// Sum of all words that the accelerator receives.
     pub(crate) fn sum_of_input(&self, variant: &Variant) -> u32 {
-        let (_, lanes) = self.on(variant);
-        lanes.iter().fold(0, |sum, lane| {
+        self.packed(variant).iter().fold(0, |sum, lane| {
             lane.packets.iter().fold(sum, |sum, segment| sum_words(sum, &lane.segments[*segment]))
         })
     }

@@ -11,7 +11,6 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use super::packing::{beats_of_results, beats_out, rows_out, unpack};
 use super::ring::{EOF, Ring, SOF};
 use super::scene::{Body, Lane, Step};
-use super::windowed::design;
 use super::{BOTH, Host, microseconds};
 
 /// Longer than any step of the tests takes.
@@ -294,12 +293,7 @@ impl Machine {
 
     pub(crate) fn step(&mut self, step: &Step) -> Result<Outcome, Failure> {
         let variant = self.host.variant();
-        if design(&variant).is_none() {
-            return self.step_with(step, &step.packed(&variant));
-        }
-        let packed = step.packed_once(&variant);
-        let outcome = self.step_with(&step.moving_in_order(&packed.leave), &packed.lanes)?;
-        Ok(Outcome { bodies: step.restored(&packed.leave, &outcome.bodies), ..outcome })
+        self.step_with(step, &step.packed(&variant))
     }
 }
 

@@ -2,8 +2,7 @@
 
 use bitstream_model::{BoardConfig, Counts, FaultPlan, PacketCount, RegisterAccess, ViolationKind};
 use pgs_interface::control;
-use pgs_interface::number::Numbers;
-use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
+use pgs_interface::profile::{FLOAT, HALF, Profile};
 use pgs_interface::record::Beat;
 use pgs_interface::stripe::{Stripe, Stripes};
 
@@ -13,34 +12,22 @@ use super::scene::{AT_REST, Body, Collision, Lane, STATIC, Step, bits};
 use super::sg::{Failure, Flight, Machine, Outcome};
 
 /// The designs that have short cuts.
-pub(crate) const PROFILES: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
+pub(crate) const PROFILES: [&Profile; 2] = [&FLOAT, &HALF];
 
-/// Designs of no table that have short cuts too: two, three and six beats of a collision on each of
-/// three, two and one streams; one without a short cut for bodies; one with narrow streams; and one
-/// with pairs of collisions on other streams than in `half`.
-pub(crate) const OTHERS: [&Profile; 6] =
-    [&ON_THREE, &ON_TWO, &ON_ONE, &BODIES_APART, &NARROW, &PAIRS];
+/// Designs of no table that have short cuts too: one without a short cut for bodies, one with narrow
+/// streams, and one with pairs of collisions on other streams than in `half`.
+pub(crate) const OTHERS: [&Profile; 3] = [&BODIES_APART, &NARROW, &PAIRS];
 
-static ON_THREE: Profile = RELATIVE;
-static ON_TWO: Profile = Profile {
-    mm2s_widths: &[128; 2],
-    s2mm_widths: &[128; 2],
-    stripes: in_turn(&[0, 1]),
-    ..RELATIVE
-};
-static ON_ONE: Profile =
-    Profile { mm2s_widths: &[128], s2mm_widths: &[128], stripes: in_turn(&[0]), ..RELATIVE };
 static BODIES_APART: Profile = Profile {
     stripes: Stripes {
-        collisions: Stripe { streams: &[2, 0, 1], padded: true },
-        warm_collisions: None,
         velocities: Stripe { streams: &[2], padded: false },
         poses: Stripe { streams: &[1], padded: false },
         results: Stripe { streams: &[0, 1, 2], padded: true },
+        ..FLOAT.stripes
     },
-    ..MIXED
+    ..FLOAT
 };
-static NARROW: Profile = Profile { mm2s_widths: &[128, 32, 64], ..MIXED };
+static NARROW: Profile = Profile { mm2s_widths: &[128, 32, 64, 128], ..FLOAT };
 static PAIRS: Profile = Profile {
     mm2s_widths: &[64, 128, 32],
     stripes: Stripes {
@@ -51,18 +38,6 @@ static PAIRS: Profile = Profile {
     initiation_interval: 2,
     ..HALF
 };
-/// Its collisions are in f32, so that the stripe of `mixed`'s warm passes does not fit them.
-const RELATIVE: Profile = Profile {
-    numbers: Numbers::F32,
-    stripes: Stripes { warm_collisions: None, ..MIXED.stripes },
-    ..MIXED
-};
-
-const fn in_turn(streams: &'static [u8]) -> Stripes {
-    let stripe = Stripe { streams, padded: false };
-    Stripes::new(stripe, stripe)
-}
-
 /// Bodies as bits; cycles, stalls, waits, impulse sum and hazards; sums of the received and sent
 /// words; the impulses that went out.
 pub(crate) type Visible = (Vec<[[u32; 4]; 4]>, [u64; 5], [u32; 2], Vec<Beat>);
@@ -213,21 +188,6 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
         coefficient: 0.2,
         ..Step::new(all.clone(), (0..collisions).map(collision).collect())
     }
-}
-
-/// The step with contact points missing anywhere, where the design has a word for that.
-pub(crate) fn with_gaps(mut step: Step, seed: u64, profile: &Profile) -> Step {
-    if profile.geometry == Geometry::Relative {
-        for (n, collision) in (0..).zip(&mut step.collisions) {
-            let random = scatter(seed ^ 0x77, n);
-            for (k, contact) in collision.contacts.iter_mut().enumerate() {
-                if random.is_multiple_of(3) && random >> (8 + k) & 1 == 1 {
-                    contact[3] = f32::INFINITY;
-                }
-            }
-        }
-    }
-    step
 }
 
 /// The step with each extension whose bit is set: a friction for each collision in `float`, a warm start and

@@ -4,7 +4,6 @@
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind, FaultPlan, StepPhase, When};
 use pgs_interface::axi_dma::{CHANNEL_REGISTERS, DMACR, dmacr, dmasr};
 use pgs_interface::control::{self, ErrorCode};
-use pgs_interface::profile::WINDOWED;
 
 use crate::common;
 use crate::common::scene::{Step, bits};
@@ -338,22 +337,5 @@ fn the_board_lists_the_packets_of_a_step() {
             assert_eq!((pass.beats, pass.descriptors), (beats, 1));
             assert_eq!(pass.phase, Some(StepPhase::Contact(1)));
         }
-    }
-}
-
-#[test]
-fn faults_happen_where_the_collisions_are_streamed_once_too() {
-    let config = BoardConfig { profile: &WINDOWED, ..BoardConfig::default() };
-    let step = Step::falling(20);
-    let before: Vec<_> =
-        Machine::new(config).step(&step).expect("no fault").bodies.iter().map(bits).collect();
-    for text in ["stall@dma2.mm2s,phase=load,beat=4", "accelerator-error=4", "no-done"] {
-        let mut machine = Machine::new(config);
-        machine.host.board.inject(plan(text));
-        machine.step(&step).map(|_| ()).expect_err(text);
-        assert_eq!(machine.host.board.faults(), 1, "{text}");
-        machine.recover();
-        let after = machine.step(&step).expect("no fault").bodies;
-        assert!(after.iter().map(bits).eq(before.iter().copied()), "{text}");
     }
 }

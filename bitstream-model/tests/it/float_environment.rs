@@ -50,7 +50,8 @@ fn a_step_is_the_same_in_every_environment_on_every_number_of_threads() {
         println!("skipped: nothing is known of this processor's floating-point environment");
     }
     for config in boards() {
-        let (told, lanes) = step().on(&config.variant());
+        let told = step();
+        let lanes = told.packed(&config.variant());
         let bodies = told.bodies.len();
         let drive = |machine: &mut Machine| machine.drive(&told, &lanes).expect("it completes");
         // The results are decoded outside of the environment.

@@ -21,4 +21,3 @@ mod shortcuts;
 mod shortcuts_buffers;
 mod shortcuts_warm;
 mod velocities_only;
-mod windowed;

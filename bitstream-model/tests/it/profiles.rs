@@ -7,12 +7,12 @@ use bitstream_model::{Bandwidth, BoardConfig, Delays, EmulatedBoard, Hazards};
 use pgs_interface::control::{self, ErrorCode};
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{
-    FLOAT, Flow, HALF, Inertia, MIXED, NAIVE, OnChipMemory, PROFILES, Profile, Variant,
+    FLOAT, HALF, Inertia, NAIVE, OnChipMemory, PROFILES, Profile, Variant,
 };
 use pgs_interface::record::Beat;
 use pgs_interface::stripe::{Stripe, Stripes};
 
-use crate::common::packing::{Row, beats, result_beats};
+use crate::common::packing::result_beats;
 use crate::common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
 use crate::common::sg::{Failure, Machine, Outcome};
 
@@ -39,11 +39,6 @@ fn variants() -> Vec<Variant> {
     let numbers = Numbers { bodies: half, poses: half, ..numbers };
     variants.push(Variant { profile: &HALF, numbers, inertia: Inertia::Isotropic });
     variants
-}
-
-/// The variants whose passes run one after the other.
-fn in_passes(variants: Vec<Variant>) -> impl Iterator<Item = Variant> {
-    variants.into_iter().filter(|variant| variant.profile.flow == Flow::Passes)
 }
 
 fn own_variants() -> Vec<Variant> {
@@ -87,9 +82,6 @@ fn masses_on_the_ground_stop_alike_on_every_profile_whatever_their_number() {
             continue;
         }
         for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
-            if variant.profile.flow != Flow::Passes && hazards == Hazards::Unchecked {
-                continue;
-            }
             let config = BoardConfig { hazards, ..config(variant.profile) };
             let mut machine = built(&variant, config);
             for bodies in 1..9 {
@@ -136,7 +128,7 @@ fn words_of_the_padding_are_summed_and_otherwise_ignored() {
 
 #[test]
 fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
-    for variant in in_passes(variants()) {
+    for variant in variants() {
         for bandwidth in [Bandwidth::Unlimited, Bandwidth::BytesPerSecond(1 << 30)] {
             for scene in [
                 Step::falling(1),
@@ -161,10 +153,10 @@ fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
     }
 }
 
-/// By hand: eight beats of `half` take its stream of 64 bits four cycles, four of `mixed` a stream two.
+/// By hand: eight beats of `half` take its stream of 64 bits four cycles.
 #[test]
 fn an_issue_of_a_warm_pass_takes_the_cycles_of_its_busiest_stream() {
-    for (profile, interval) in [(&NAIVE, 32), (&FLOAT, 2), (&HALF, 4), (&MIXED, 2)] {
+    for (profile, interval) in [(&NAIVE, 32), (&FLOAT, 2), (&HALF, 4)] {
         let variant = profile.default_variant();
         let work = |step: &Step| {
             let outcome = unlimited(&variant).step(step).expect("the step completes");
@@ -198,7 +190,6 @@ fn the_thesis_step_takes_the_cycles_of_the_formula_on_each_profile() {
         (&FLOAT, 19_440, 127_000 * 2, of_float, 38_880),
         // Groups of five beats take two cycles.
         (&HALF, 15_552, 63_500 * 3, fill, 31_104),
-        (&MIXED, 25_920, 127_000, fill, 51_840),
     ] {
         let expected = load + 8 * pass + fill + last + 264;
         assert_eq!(step.cycles(&profile.default_variant()), expected, "{}", profile.name);
@@ -217,7 +208,7 @@ fn without_hazards_a_large_step_waits_for_its_start_alone() {
 
 #[test]
 fn packets_that_end_too_early_or_too_late_are_refused_on_every_stream() {
-    for variant in in_passes(own_variants()) {
+    for variant in own_variants() {
         // Odd numbers: padding at the end of each segment of `half`.
         let scene = Step::on_ground(3, 3);
         let sound = scene.packed(&variant);
@@ -266,7 +257,7 @@ fn a_step_whose_padding_does_not_come_does_not_end() {
 
 #[test]
 fn bad_records_are_refused_with_the_index_of_the_record() {
-    for variant in in_passes(own_variants()) {
+    for variant in own_variants() {
         let spoilt = |change: &dyn Fn(&mut Collision)| {
             let mut scene = Step::on_ground(3, 3);
             change(&mut scene.collisions[2]);
@@ -359,41 +350,12 @@ fn padding_changes_nothing_wherever_it_stands() {
 }
 
 #[test]
-fn an_unused_point_may_stand_anywhere_in_a_relative_record() {
-    let variant = MIXED.default_variant();
-    let scene = Step { friction: 0.0, ..Step::on_ground(1, 1) };
-    let expected = unlimited(&variant).step(&scene).expect("the step completes");
-    let lanes = scene.packed(&variant);
-    for used in 0..4 {
-        // A row is half a beat; rows 2 to 5 are the points.
-        let mut rows: Vec<Row> = Vec::new();
-        for lane in &lanes {
-            let [a, b, c, d] = lane.segments[1][0].0;
-            rows.extend([
-                [a & 0xFFFF, a >> 16, b & 0xFFFF, b >> 16],
-                [c & 0xFFFF, c >> 16, d & 0xFFFF, d >> 16],
-            ]);
-        }
-        rows.swap(2, 2 + used);
-        let mut moved = lanes.clone();
-        let packed = beats(StreamFormat::Binary16, &rows);
-        for (lane, beat) in moved.iter_mut().zip(packed) {
-            lane.segments[1] = vec![beat];
-        }
-        let outcome = unlimited(&variant).step_with(&scene, &moved).expect("the step completes");
-        assert_eq!(states(&outcome), states(&expected), "point {used}");
-        assert_eq!(outcome.impulse_sum, expected.impulse_sum);
-    }
-}
-
-#[test]
 fn the_registers_say_how_each_board_was_built() {
     // Profile, channels, widths, issue, clock, bodies, memory per record, numbers.
     let cases = [
         (&NAIVE, [2, 0x0101, 0x2, 0x0001_001C, 275_000, 131_072, (16 << 16) | 24, 0]),
         (&FLOAT, [1, 0x0404, 0x4444, 0x0001_0002, 275_000, 131_072, (16 << 16) | 24, 0]),
         (&HALF, [3, 0x0303, 0x344, 0x0002_0003, 250_000, 65_536, (8 << 16) | 24, 0x111_1111]),
-        (&MIXED, [4, 0x0303, 0x444, 0x0001_0001, 250_000, 65_536, (16 << 16) | 24, 0x1]),
     ];
     let registers = [
         control::PROFILE,
@@ -440,9 +402,6 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
     };
     let thesis = StreamFormat::Thesis16;
     for format in [thesis, StreamFormat::Thesis16Literal] {
-        let text = with(&MIXED, Numbers { collisions: format, ..MIXED.numbers });
-        let expected = format!("in {}, which has no infinity", format.name());
-        assert!(text.contains(&expected) && text.contains("expected f32 or binary16"), "{text}");
         let numbers = Some(Numbers { bodies: format, ..HALF.numbers });
         let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
         assert!(text.contains(&format!("in {}, which has no zero", format.name())), "{text}");
@@ -532,7 +491,6 @@ fn result_packets_have_the_beats_that_the_stripes_say() {
     for (profile, bodies, expected) in [
         (&NAIVE, 3, vec![12]),
         (&FLOAT, 3, vec![3, 3, 3, 3]),
-        (&MIXED, 1, vec![2, 1, 1]),
         // Six beats, padded to two groups.
         (&HALF, 3, vec![4, 4, 2]),
     ] {

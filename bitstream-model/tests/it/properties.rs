@@ -9,7 +9,7 @@ use pgs_interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LEN
 use pgs_interface::control::{self, ap_ctrl};
 use pgs_interface::descriptor::WORDS;
 use pgs_interface::number::{Numbers, StreamFormat};
-use pgs_interface::profile::{Flow, HALF, Inertia, PROFILES, Profile, Variant};
+use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile, Variant};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -144,16 +144,11 @@ fn config() -> impl Strategy<Value = BoardConfig> {
             |(variant, switches, length_width, address_width, bandwidth, window_slots)| {
                 let [direct, unchecked, flush, strict] = switches;
                 let Variant { profile, numbers, inertia } = variant;
-                let unchecked_window = unchecked && profile.flow != Flow::Passes;
                 BoardConfig {
                     profile,
                     numbers: Some(numbers),
                     inertia,
-                    hazards: if unchecked && !unchecked_window {
-                        Hazards::Unchecked
-                    } else {
-                        Hazards::Interlocked
-                    },
+                    hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
                     window_slots,
                     subnormals: if flush { Subnormals::Flush } else { Subnormals::Keep },
                     bandwidth,
@@ -251,7 +246,7 @@ impl Playground {
                 host.set_control(control::RESET, 1);
                 host.pause(1);
                 let scene = Step { iterations: [1, 1], ..Step::on_ground(bodies, collisions) };
-                let (scene, lanes) = scene.on(&host.variant());
+                let lanes = scene.packed(&host.variant());
                 scene.write_arguments(host);
                 host.set_control(control::IER, 0b111);
                 host.set_control(control::GIE, 1);
@@ -341,7 +336,8 @@ proptest! {
     ) {
         let config = BoardConfig { scatter_gather: true, length_width: 26, ..config };
         let mut machine = Machine::new(config);
-        let (scene, mut lanes) = Step::on_ground(bodies, collisions).on(&machine.host.variant());
+        let scene = Step::on_ground(bodies, collisions);
+        let mut lanes = scene.packed(&machine.host.variant());
         scene.write_arguments(&machine.host);
         for (register, word) in [control::TIME_STEP, control::FRICTION, control::GRAVITY_Y].into_iter().zip(&words) {
             machine.host.set_control(register, *word);

@@ -3,22 +3,19 @@
 
 use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
 use pgs_interface::control;
-use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, Profile};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, Profile};
 use proptest::prelude::*;
 
 use crate::common;
 use crate::common::scene::Step;
 use crate::common::sg::LONG;
-use crate::common::shortcuts::{
-    OTHERS, begin, begin_once, below, extended, same, scene, with_gaps,
-};
+use crate::common::shortcuts::{OTHERS, begin, begin_once, below, extended, same, scene};
 
 fn config() -> impl Strategy<Value = BoardConfig> {
     (
         prop_oneof![
             3 => Just(&FLOAT),
             4 => Just(&HALF),
-            3 => Just(&MIXED),
             2 => prop::sample::select(&OTHERS[..]),
         ],
         prop::sample::select(&[16_usize, 48, 512][..]),
@@ -65,7 +62,7 @@ proptest! {
         extensions in any::<u8>(),
         spoilt in prop::option::weighted(0.3, (any::<u64>(), 0..5_u32)),
     ) {
-        let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+        let step = scene(bodies, collisions, seed, apart);
         let mut step = extended(step, extensions, seed, config.profile);
         step.iterations = iterations;
         if let Some((at, how)) = spoilt.filter(|_| collisions > 0) {
@@ -155,7 +152,7 @@ fn step_with_faults(
     iterations: [u32; 2],
     extensions: u8,
 ) {
-    let step = with_gaps(scene(bodies, collisions, seed, apart), seed, config.profile);
+    let step = scene(bodies, collisions, seed, apart);
     let step = extended(step, extensions, seed, config.profile);
     let step = Step { iterations, ..step };
     let plan = FaultPlan::random(seed, &config, iterations[0], iterations[1]);
@@ -170,7 +167,7 @@ fn host_that_looks(
     extensions: u8,
     pauses: &[u64],
 ) {
-    let step = with_gaps(scene(bodies, 500, seed, apart), seed, config.profile);
+    let step = scene(bodies, 500, seed, apart);
     let step = extended(step, extensions, seed, config.profile);
     let config = BoardConfig { length_width: 26, ..config };
     let seen = same(config, None, 1, |machine| {

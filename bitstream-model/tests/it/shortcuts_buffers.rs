@@ -4,7 +4,7 @@
 use bitstream_model::{BoardConfig, DeviceAccess, Direction, FaultPlan};
 use half::f16;
 use pgs_interface::control;
-use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, Profile};
+use pgs_interface::profile::{FLOAT, HALF, Profile};
 use pgs_interface::record::Beat;
 
 use crate::common::packing::beats_out;
@@ -29,16 +29,9 @@ struct FirstContact {
 
 impl FirstContact {
     fn of(profile: &Profile) -> Self {
-        match (profile.geometry, profile.collisions_per_issue) {
-            (Geometry::Absolute, 1) => {
-                Self { stream: 3, together: 1, share: 1, beat: 0, half: None }
-            }
-            (Geometry::Absolute, _) => {
-                Self { stream: 0, together: 2, share: 3, beat: 1, half: Some(1) }
-            }
-            (Geometry::Relative, _) => {
-                Self { stream: 1, together: 1, share: 1, beat: 0, half: Some(0) }
-            }
+        match profile.collisions_per_issue {
+            1 => Self { stream: 3, together: 1, share: 1, beat: 0, half: None },
+            _ => Self { stream: 0, together: 2, share: 3, beat: 1, half: Some(1) },
         }
     }
 
@@ -97,18 +90,13 @@ fn other_bytes_in_a_later_pass_are_noticed() {
         // The decoder refuses a wrong record in the pass that brings it.
         let refused = run(&|stream, packet, beats| {
             if stream == 0 && packet == 6 {
-                match (profile.geometry, contact.half) {
-                    (Geometry::Absolute, None) => beats[2 * 300].0[3] = 5,
-                    (Geometry::Absolute, Some(_)) => beats[3 * 150].0[1] |= 5 << 16,
-                    // The index of body A.
-                    (Geometry::Relative, _) => beats[300].0[1] |= 0xFFFF_0000,
+                match contact.half {
+                    None => beats[2 * 300].0[3] = 5,
+                    Some(_) => beats[3 * 150].0[1] |= 5 << 16,
                 }
             }
         });
-        let code = match profile.geometry {
-            Geometry::Absolute => control::ErrorCode::ContactCount,
-            Geometry::Relative => control::ErrorCode::BodyIndex,
-        };
+        let code = control::ErrorCode::ContactCount;
         assert_eq!(refused.steps, [Err(Failure::Accelerator(code as u32, 0, 300))]);
     }
 }
@@ -164,11 +152,7 @@ fn the_same_bytes_in_other_buffers_give_the_same() {
 #[test]
 fn a_corrupt_beat_in_a_later_pass_is_noticed() {
     let step = large();
-    for (profile, spoils) in [
-        (&FLOAT, "0x00700000@dma3.mm2s"),
-        (&HALF, "0x04000400@dma0.mm2s"),
-        (&MIXED, "0x04000000@dma1.mm2s"),
-    ] {
+    for (profile, spoils) in [(&FLOAT, "0x00700000@dma3.mm2s"), (&HALF, "0x04000400@dma0.mm2s")] {
         let config = BoardConfig { profile, ..whole_length() };
         let usual = same(config, None, 1, |machine| machine.step(&step));
         for at in ["contact1", "contact3", "friction2"] {
@@ -186,7 +170,7 @@ fn a_buffer_that_changes_hands_in_the_middle_of_a_pass_is_noticed() {
     let step = large();
     for profile in PROFILES {
         let contact = FirstContact::of(profile);
-        // A pass takes some 1600 cycles of 3.6 ns, or 1200 of 4 ns, or 800.
+        // A pass takes some 1600 cycles of 3.6 ns, or 1200 of 4 ns.
         for pause in [3, 5, 6, 8, 14, 21, 33] {
             let config = BoardConfig { profile, ..whole_length() };
             let seen = same(config, None, 1, |machine| {
@@ -258,24 +242,14 @@ impl Moment {
 /// When each moment is for a step of 3000 bodies and 40 collisions, microseconds from its start.
 type Moments = [(Moment, &'static [u64]); 3];
 
-const MOMENTS: [(&Profile, Moments); 2] = [
-    (
-        &FLOAT,
-        [
-            (Moment::Load, &[1, 3, 6]),
-            (Moment::Poses, &[20, 44, 49]),
-            (Moment::Results, &[44, 49, 51, 57]),
-        ],
-    ),
-    (
-        &MIXED,
-        [
-            (Moment::Load, &[1, 3, 6]),
-            (Moment::Poses, &[20, 49, 55]),
-            (Moment::Results, &[49, 55, 62]),
-        ],
-    ),
-];
+const MOMENTS: [(&Profile, Moments); 1] = [(
+    &FLOAT,
+    [
+        (Moment::Load, &[1, 3, 6]),
+        (Moment::Poses, &[20, 44, 49]),
+        (Moment::Results, &[44, 49, 51, 57]),
+    ],
+)];
 
 #[test]
 fn a_buffer_of_bodies_that_changes_hands_is_noticed() {
@@ -300,13 +274,10 @@ fn a_buffer_of_bodies_that_changes_hands_is_noticed() {
     };
     for (profile, moments) in MOMENTS {
         for (moment, pauses) in moments {
-            // Stream 2 carries the odd bodies of `float`, and two of three of `mixed`, without the
-            // velocities of static bodies, which the board ignores; and one row of every result.
-            let all = match (moment, profile.geometry) {
-                (Moment::Load | Moment::Poses, Geometry::Absolute) => 1500,
-                (Moment::Load, Geometry::Relative) => 1750,
-                (Moment::Poses, Geometry::Relative) => 2000,
-                (Moment::Results, _) => 3000,
+            // Stream 2 carries the odd bodies, and one row of every result.
+            let all = match moment {
+                Moment::Load | Moment::Poses => 1500,
+                Moment::Results => 3000,
             };
             for pause in pauses {
                 let [usual, changed] =

@@ -2,7 +2,7 @@
 
 use bitstream_model::BoardConfig;
 use pgs_interface::extension::Extensions;
-use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
 use crate::common::scene::{Step, bits, result_beats};
 use crate::common::sg::{Flight, LONG, Machine};
@@ -11,7 +11,7 @@ use crate::common::sg::{Flight, LONG, Machine};
 /// half the beats.
 #[test]
 fn a_step_without_poses_gives_out_velocities_alone() {
-    for profile in [&FLOAT, &NAIVE, &HALF, &MIXED] {
+    for profile in [&FLOAT, &NAIVE, &HALF] {
         let config = BoardConfig { profile, ..BoardConfig::default() };
         let variant = config.variant();
         let mut machine = Machine::new(config);

@@ -25,7 +25,9 @@ use crate::scene::{Bodies, Body, Pose, Velocity};
 use crate::simd::{Vectors, Work, in_wide_vectors};
 
 /// Checks all bodies, and keeps the values that collision records need and the indices of static
-/// bodies; returns whether validation accepts all bodies.
+/// bodies; returns whether validation accepts all bodies. A step writes the records meanwhile
+/// ([`pack_bodies`]).
+#[cfg(any(test, feature = "bench"))]
 pub(crate) fn survey<B: Bodies + ?Sized>(
     target: Target<'_>,
     bodies: &B,
@@ -33,7 +35,7 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
     into: Survey<'_>,
     packers: &mut PackPool,
 ) -> bool {
-    let wanted = Wanted { into: Some(into), velocities: None, poses: None };
+    let wanted = Wanted { into, velocities: None, poses: None };
     let (.., good) = pack(target, bodies, count, wanted, packers);
     good
 }
@@ -52,44 +54,13 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     (velocities, poses): (&mut [&mut [Beat]], Option<&mut [&mut [Beat]]>),
     packers: &mut PackPool,
 ) -> (u32, u32, bool) {
-    let wanted =
-        Wanted { into: Some(into), velocities: Some(whole(velocities)), poses: poses.map(whole) };
+    let wanted = Wanted { into, velocities: Some(whole(velocities)), poses: poses.map(whole) };
     pack(target, bodies, count, wanted, packers)
-}
-
-/// Writes the velocity records of `count` bodies, with their inertia where the bitstream wants it;
-/// the sum of the words written, modulo 2^32, and whether validation accepts the bodies.
-///
-/// Shape: each channel is as long as
-/// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says.
-pub(crate) fn pack_velocities<B: Bodies + ?Sized>(
-    target: Target<'_>,
-    bodies: &B,
-    count: usize,
-    channels: &mut [&mut [Beat]],
-    packers: &mut PackPool,
-) -> (u32, bool) {
-    let wanted = Wanted { into: None, velocities: Some(whole(channels)), poses: None };
-    let (sum, _, good) = pack(target, bodies, count, wanted, packers);
-    (sum, good)
-}
-
-/// Writes the pose records of `count` bodies; otherwise as [`pack_velocities`].
-pub(crate) fn pack_poses<B: Bodies + ?Sized>(
-    target: Target<'_>,
-    bodies: &B,
-    count: usize,
-    channels: &mut [&mut [Beat]],
-    packers: &mut PackPool,
-) -> (u32, bool) {
-    let wanted = Wanted { into: None, velocities: None, poses: Some(whole(channels)) };
-    let (_, sum, good) = pack(target, bodies, count, wanted, packers);
-    (sum, good)
 }
 
 /// The outputs that a caller wants of bodies.
 struct Wanted<'a> {
-    into: Option<Survey<'a>>,
+    into: Survey<'a>,
     velocities: Option<Piece<'a>>,
     poses: Option<Piece<'a>>,
 }
@@ -104,22 +75,20 @@ fn pack<B: Bodies + ?Sized>(
     packers: &mut PackPool,
 ) -> (u32, u32, bool) {
     let Wanted { mut into, velocities, poses } = wanted;
-    let ends = into.as_mut().map(|into| into.ends(count));
+    let ends = into.ends(count);
     let cut = |size| parts(target, (count, size), ends, velocities, poses);
     let mut all = Outcome::default();
     let work = |part| pack_part(target, bodies, part);
     packers.each(count, cut, work, |of_part| all.join(of_part));
     let Outcome { velocities, poses, good, still } = all;
-    if let Some(into) = &mut into {
-        into.settle(still);
-    }
+    into.settle(still);
     (velocities, poses, good)
 }
 
 /// A range of bodies, and the destinations of the wanted outputs.
 struct Part<'a> {
     range: Range<usize>,
-    ends: Option<&'a mut [End]>,
+    ends: &'a mut [End],
     velocities: Option<Piece<'a>>,
     poses: Option<Piece<'a>>,
 }
@@ -128,19 +97,19 @@ struct Part<'a> {
 fn parts<'a>(
     target: Target<'_>,
     (count, size): (usize, usize),
-    ends: Option<&'a mut [End]>,
+    ends: &'a mut [End],
     velocities: Option<Piece<'a>>,
     poses: Option<Piece<'a>>,
 ) -> impl Iterator<Item = Part<'a>> + Send {
     let [of_velocities, of_poses] =
         [Segment::Velocities, Segment::Poses].map(|segment| segment.layout(target.variant));
-    let mut ends = ends.map(|ends| ends.chunks_mut(size));
+    let mut ends = ends.chunks_mut(size);
     let mut velocities =
         velocities.map(|channels| ChannelChunks::new(&of_velocities, size, channels));
     let mut poses = poses.map(|channels| ChannelChunks::new(&of_poses, size, channels));
     ranges(count, size).map(move |range| Part {
         range,
-        ends: ends.as_mut().map(|ends| ends.next().unwrap_or_default()),
+        ends: ends.next().unwrap_or_default(),
         velocities: velocities.as_mut().map(ChannelChunks::cut),
         poses: poses.as_mut().map(ChannelChunks::cut),
     })
@@ -206,7 +175,7 @@ struct BodyPacker<'a, 'b> {
     /// The index of the next body.
     next: usize,
     /// The ends that are not written yet.
-    ends: Option<&'a mut [End]>,
+    ends: &'a mut [End],
     velocities: Option<Velocities<'a, 'b>>,
     poses: Option<Poses<'a, 'b>>,
     good: bool,
@@ -221,7 +190,7 @@ impl<'a, 'b> BodyPacker<'a, 'b> {
             target,
             tags: Tags::new(target.shapes),
             next: range.start,
-            ends: ends.as_deref_mut(),
+            ends,
             velocities: velocities.as_mut().map(|channels| Velocities::new(target, channels)),
             poses: poses.as_mut().map(|channels| Poses::new(target, channels)),
             good,
@@ -259,20 +228,12 @@ impl Work for Writing<'_, '_, '_> {
         let quick = target.quick;
         let range = *next..*next + bodies.len();
         *next = range.end;
-        if let Some(rest) = ends {
-            let (ends, behind) = mem::take(rest).split_at_mut(bodies.len());
-            *rest = behind;
-            let any_still = tags.ends(bodies, ends);
-            *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, ends, any_still));
-            if any_still {
-                *still = around(still, &range);
-            }
-        } else if let Some(quick) = quick {
-            // The caller may have changed the bodies since the survey, so their ends are made
-            // again.
-            let mut ends = [End::MISSING; BODIES];
-            let any_still = tags.ends(bodies, &mut ends);
-            *good &= quick.bodies(range.start, bodies, &ends, any_still);
+        let (written, behind) = mem::take(ends).split_at_mut(bodies.len());
+        *ends = behind;
+        let any_still = tags.ends(bodies, written);
+        *good &= quick.is_none_or(|quick| quick.bodies(range.start, bodies, written, any_still));
+        if any_still {
+            *still = around(still, &range);
         }
         if let Some(velocities) = velocities {
             velocities.write(vectors, bodies);
@@ -281,27 +242,6 @@ impl Work for Writing<'_, '_, '_> {
             poses.write(vectors, bodies);
         }
     }
-}
-
-/// Some of the bodies, in an order of their own: a view for packing.
-#[derive(Debug)]
-pub(crate) struct Chosen<'a, B: ?Sized> {
-    pub(crate) bodies: &'a B,
-    /// Their indices.
-    pub(crate) order: &'a [u32],
-}
-
-impl<B: Bodies + ?Sized> Bodies for Chosen<'_, B> {
-    fn len(&self) -> usize {
-        self.order.len()
-    }
-
-    fn body(&self, index: usize) -> Body {
-        self.bodies.body(self.order[index] as usize)
-    }
-
-    /// Nothing is stored through a view.
-    fn commit(&mut self, _: usize, _: Pose, _: Velocity) {}
 }
 
 /// The initial content of a block of copies.

@@ -3,23 +3,21 @@
 //! The method is the one of [`bodies`](super::bodies): threads take ranges, each range goes block
 //! by block, and the packer writes each beat once, upwards, and never reads it back.
 
-use std::marker::PhantomData;
 use std::ops::Range;
 
-use pgs_interface::profile::Geometry;
-use pgs_interface::record::Beat;
+use pgs_interface::record::{Beat, collision};
 
-use super::encode::{Absolute, Encoding, Kind, Relative, Worded, most_are_full};
+use super::encode::{Encoding, most_are_full};
 use super::pool::{ChannelChunks, PackPool, Piece, ranges, whole};
 use super::stripe_writer::{BLOCK, CHECKED, MANY, StripeWriter};
 use super::target::Target;
 use crate::beat::format::{Format, in_format};
 use crate::beat::stripe::Segment;
-use crate::record::body_table::{Ends, Lookup};
+use crate::record::body_table::{Ends, Lookup as _};
 use crate::record::sixteen::Sixteen;
 use crate::record::source::{CollisionSource, Contiguous, InNearbyOrder, Indexed};
 use crate::scene::{Collision, Collisions, Structures};
-use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
+use crate::simd::{Vectors, Work, in_wide_vectors};
 use crate::validate::{Block, Look, Quick};
 
 /// The collisions of a step, as they are sent.
@@ -30,8 +28,6 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) count: usize,
     /// Number of entries that the order added; `None` without an order.
     pub(crate) added: Option<usize>,
-    /// Two words for each record, in place of the bodies' indices. Only for [`Geometry::Relative`].
-    pub(crate) words: Option<&'a [[u32; 2]]>,
 }
 
 /// Writes the records of collisions; the sum of the words written, modulo 2^32, whether validation
@@ -103,8 +99,8 @@ fn pack_range<C: Collisions + ?Sized>(
     entries: &Entries<'_, C>,
     (range, mut channels): (Range<usize>, Piece<'_>),
 ) -> (u32, Seen) {
-    let Entries { collisions, count, words, .. } = *entries;
-    let mut packer = CollisionPacker::new(target, ends, words, range.start, &mut channels);
+    let Entries { collisions, count, .. } = *entries;
+    let mut packer = CollisionPacker::new(target, ends, range.start, &mut channels);
     let seen = match collisions.structures().filter(|all| all.len() == count) {
         Some(Structures::Array(all)) => packer.write(Contiguous(all).part(range)),
         Some(Structures::Ordered { all, order }) => {
@@ -139,10 +135,7 @@ fn pack_range<C: Collisions + ?Sized>(
 pub(crate) struct CollisionPacker<'a, 'b> {
     quick: Option<&'a Quick<'a>>,
     ends: Ends<'a>,
-    /// As in [`Entries`].
-    words: Option<&'a [[u32; 2]]>,
     dealer: StripeWriter<'a, 'b>,
-    geometry: Geometry,
     /// The index of the next collision.
     next: usize,
     /// Whether most collisions are expected to have all contact points. The block written last
@@ -159,14 +152,12 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
     pub(crate) fn new(
         target: Target<'a>,
         ends: Ends<'a>,
-        words: Option<&'a [[u32; 2]]>,
         first: usize,
         channels: &'a mut [&'b mut [Beat]],
     ) -> Self {
         let layout = Segment::Collisions.layout(target.variant);
-        let geometry = target.variant.profile.geometry;
         let dealer = StripeWriter::new(&layout, channels);
-        Self { quick: target.quick, ends, words, dealer, geometry, next: first, most_full: true }
+        Self { quick: target.quick, ends, dealer, next: first, most_full: true }
     }
 
     /// As before, but few of the first collisions are expected to have all contact points.
@@ -193,20 +184,11 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 
     #[inline(always)]
     fn write_lying<'p, L: CollisionSource<'p>>(&'p mut self, collisions: L) -> Seen {
-        let Self { quick, ends, words, dealer, geometry, next, most_full } = self;
+        let Self { quick, ends, dealer, next, most_full } = self;
         let (quick, first) = (*quick, *next);
         *next += collisions.len();
         let all = Block { first, collisions, ends: *ends };
-        macro_rules! writing {
-            ($kind:expr) => {
-                Writing { kind: $kind, rows: PhantomData, quick, all, dealer, most_full }
-            };
-        }
-        match (*geometry, *words) {
-            (Geometry::Absolute, _) => in_wide_vectors(writing!(Absolute)),
-            (Geometry::Relative, None) => in_wide_vectors(writing!(Relative)),
-            (Geometry::Relative, Some(words)) => in_wide_vectors(writing!(Worded(words))),
-        }
+        in_wide_vectors(Writing { quick, all, dealer, most_full })
     }
 
     /// Ends the segment; the sum of the words written, modulo 2^32.
@@ -216,18 +198,14 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
 }
 
 /// Collisions, and the writer that they go to.
-struct Writing<'p, 'a, 'b, K, L, const ROWS: usize> {
-    kind: K,
-    rows: PhantomData<[Lanes; ROWS]>,
+struct Writing<'p, 'a, 'b, L> {
     quick: Option<&'p Quick<'p>>,
     all: Block<'p, L>,
     dealer: &'p mut StripeWriter<'a, 'b>,
     most_full: &'p mut bool,
 }
 
-impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Work
-    for Writing<'p, '_, '_, K, L, ROWS>
-{
+impl<'p, L: CollisionSource<'p>> Work for Writing<'p, '_, '_, L> {
     type Output = Seen;
 
     #[inline(always)]
@@ -236,7 +214,7 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Work
     }
 }
 
-impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '_, '_, K, L, ROWS> {
+impl<'p, L: CollisionSource<'p>> Writing<'p, '_, '_, L> {
     /// Whether a loop with checks branches around the masks where all contact points are used. In
     /// loops of f32, and in loops without checks, the branch costs as much as the masks. The
     /// conversion to the thesis' format takes far longer than either.
@@ -248,8 +226,8 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '
     /// meanwhile.
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> Seen {
-        let Self { kind, quick, all, dealer, most_full, .. } = self;
-        let Some(ends) = <K::Among<'p, F> as Lookup>::of(all.ends) else {
+        let Self { quick, all, dealer, most_full } = self;
+        let Some(ends) = F::Among::of(all.ends) else {
             return Seen::REFUSED;
         };
         let mut seen = Seen::NOTHING;
@@ -262,9 +240,8 @@ impl<'p, K: Kind<ROWS>, L: CollisionSource<'p>, const ROWS: usize> Writing<'p, '
             // A loop for each kind of check, so that no loop tests for it.
             macro_rules! written {
                 ($witness:expr, $most_full:literal) => {{
-                    let mut records =
-                        Encoding::<_, _, _, _, $most_full>::new(kind, &block, ends, $witness);
-                    dealer.write_as::<V, F, _, ROWS>(vectors, &mut records);
+                    let mut records = Encoding::<_, _, _, $most_full>::new(&block, ends, $witness);
+                    dealer.write_as::<V, F, _, { collision::ROWS }>(vectors, &mut records);
                     records
                 }};
             }

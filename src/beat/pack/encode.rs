@@ -1,14 +1,14 @@
 //! Makes the records of a block of collisions, and screens them on the way.
 
-use pgs_interface::record::{CONTACT_POINTS, collision, relative};
+use pgs_interface::record::{CONTACT_POINTS, collision};
 
-use crate::beat::format::{Format, Records};
-use crate::record::body_table::{End, Ends, Lookup};
+use crate::beat::format::Records;
+use crate::record::body_table::{End, Lookup};
 use crate::record::largest::MAGNITUDE;
 use crate::record::source::{CollisionSource, Next};
 use crate::record::{self, Counted, FULL, Record, Rows};
 use crate::scene::Collision;
-use crate::simd::{Integer, Lanes};
+use crate::simd::Lanes;
 use crate::validate::{Block, Locations, Look, Quick};
 
 /// The sampling distance of [`most_are_full`]: eight samples in a block that is checked, two in a
@@ -27,124 +27,15 @@ pub(crate) fn most_are_full<'p>(collisions: impl CollisionSource<'p>) -> bool {
     others * 8 <= sampled.len()
 }
 
-/// A kind of collision record of `ROWS` rows.
-pub(crate) trait Kind<const ROWS: usize>: Copy {
-    /// The table for look-ups of a collision's bodies, if the record is sent in format `F`.
-    type Among<'a, F: Format>: Lookup<'a>;
-
-    /// The ends that a record is made from, given the ends of the collision's bodies.
-    fn anchors(ends: [&End; 2]) -> [&End; 2];
-
-    /// The record of collision `index`, from its [anchors](Self::anchors).
-    fn encode(self, index: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<ROWS>;
-
-    /// The locations that the record holds.
-    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations;
-}
-
-/// Records in world coordinates.
-#[derive(Clone, Copy)]
-pub(crate) struct Absolute;
-
-impl Kind<{ collision::ROWS }> for Absolute {
-    type Among<'a, F: Format> = F::Among<'a>;
-
-    #[inline(always)]
-    fn anchors(ends: [&End; 2]) -> [&End; 2] {
-        ends
-    }
-
-    #[inline(always)]
-    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ collision::ROWS }> {
-        record::collision::encode(of, anchors)
-    }
-
-    #[inline(always)]
-    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
-        let record = record::collision::encode(of, anchors);
-        let [_, a, b, points @ ..] = record.rows;
-        let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
-        let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
-        let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
-        Locations { positions: [a, b], points, sum }
-    }
-}
-
-/// Records relative to body A.
-#[derive(Clone, Copy)]
-pub(crate) struct Relative;
-
-impl Kind<{ relative::ROWS }> for Relative {
-    type Among<'a, F: Format> = F::Among<'a>;
-
-    #[inline(always)]
-    fn anchors(ends: [&End; 2]) -> [&End; 2] {
-        anchored(ends)
-    }
-
-    #[inline(always)]
-    fn encode(self, _: usize, of: Counted<'_>, anchors: [&End; 2]) -> Record<{ relative::ROWS }> {
-        record::relative::encode(of, anchors, record::bodies(of.collision))
-    }
-
-    #[inline(always)]
-    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
-        let (offset, points) = record::relative::seen(of.collision, anchors);
-        let mut magnitudes = points;
-        for (point, used) in magnitudes.iter_mut().zip(record::used_magnitudes(of.count())) {
-            *point = point.and(used);
-        }
-        let sum = added(magnitudes).plus_f32(offset.and(magnitude_of_vec3()));
-        Locations { positions: [Lanes::all(0), offset], points, sum }
-    }
-}
-
-/// The ends that a relative record is made from.
+/// The locations that the record of a collision holds.
 #[inline(always)]
-fn anchored([a, b]: [&End; 2]) -> [&End; 2] {
-    // Either few collisions have a static body, or nearly all have one, so the processor mostly
-    // predicts this branch. A predicted branch costs less than a select.
-    if a.is_static() | b.is_static() { one_still(a, b) } else { [a, b] }
-}
-
-/// As [`anchored`], if a body is static.
-#[cold]
-#[inline(never)]
-fn one_still<'a>(a: &'a End, b: &'a End) -> [&'a End; 2] {
-    record::relative::anchors([a, b], [!a.is_static(), !b.is_static()])
-}
-
-/// Records relative to body A, with a pair of words in place of each collision's body indices.
-#[derive(Clone, Copy)]
-pub(crate) struct Worded<'a>(pub(crate) &'a [[u32; 2]]);
-
-impl Kind<{ relative::ROWS }> for Worded<'_> {
-    /// The words have sixteen bits, but the indices have more: sixteen bits may not name all
-    /// bodies.
-    type Among<'a, F: Format> = Ends<'a>;
-
-    #[inline(always)]
-    fn anchors(ends: [&End; 2]) -> [&End; 2] {
-        anchored(ends)
-    }
-
-    #[inline(always)]
-    fn encode(
-        self,
-        index: usize,
-        of: Counted<'_>,
-        anchors: [&End; 2],
-    ) -> Record<{ relative::ROWS }> {
-        let [word_a, word_b] = self.0[index];
-        let words = Lanes::new([word_a, word_b, 0, 0]);
-        let bodies = [Integer::new::<0>(words), Integer::new::<1>(words)];
-        record::relative::encode(of, anchors, bodies)
-    }
-
-    #[inline(always)]
-    fn locations(of: Counted<'_>, anchors: [&End; 2]) -> Locations {
-        Relative::locations(of, anchors)
-    }
+fn locations(of: Counted<'_>, ends: [&End; 2]) -> Locations {
+    let record = record::collision::encode(of, ends);
+    let [_, a, b, points @ ..] = record.rows;
+    let magnitudes = points.map(|point| point.and(Lanes::all(MAGNITUDE)));
+    let [of_a, of_b] = [a, b].map(|position| position.and(magnitude_of_vec3()));
+    let sum = added(magnitudes).plus_f32(of_a.plus_f32(of_b));
+    Locations { positions: [a, b], points, sum }
 }
 
 /// The sum of magnitudes.
@@ -171,83 +62,56 @@ fn both<'a>(ends: impl Lookup<'a>, collision: &Collision) -> [&'a End; 2] {
 /// `MOST_FULL` says that most collisions have all contact points. A chunk in which every collision
 /// has all of them is encoded without masks. The branch for this is then mostly predicted.
 #[derive(Clone, Copy)]
-pub(crate) struct Encoding<K, L, E, W, const MOST_FULL: bool> {
-    kind: K,
-    first: usize,
+pub(crate) struct Encoding<L, E, W, const MOST_FULL: bool> {
     collisions: L,
     ends: E,
     witness: W,
 }
 
-impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, W, const MOST_FULL: bool>
-    Encoding<K, L, E, W, MOST_FULL>
+impl<'p, L: CollisionSource<'p>, E: Lookup<'p>, W, const MOST_FULL: bool>
+    Encoding<L, E, W, MOST_FULL>
 {
     /// The records of a block. Their bodies are looked up in `ends`.
     #[inline(always)]
-    pub(crate) fn new(kind: K, block: &Block<'p, L>, ends: E, witness: W) -> Self {
-        let Block { first, collisions, .. } = *block;
-        Self { kind, first, collisions, ends, witness }
+    pub(crate) fn new(block: &Block<'p, L>, ends: E, witness: W) -> Self {
+        Self { collisions: block.collisions, ends, witness }
     }
 }
 
 /// Observes the records as they are made. Every implementation carries `#[inline(always)]`.
 pub(crate) trait Witness: Copy {
-    /// Sees a collision, the ends of its bodies as they were looked up, and the ends that its
-    /// record is made from.
-    fn see<K: Kind<ROWS>, const ROWS: usize>(
-        &mut self,
-        of: Counted<'_>,
-        ends: [&End; 2],
-        anchors: [&End; 2],
-    );
+    /// Sees a collision and the ends of its bodies, which its record is made from.
+    fn see(&mut self, of: Counted<'_>, ends: [&End; 2]);
 }
 
 /// Packs without a check.
 impl Witness for () {
     #[inline(always)]
-    fn see<K: Kind<ROWS>, const ROWS: usize>(
-        &mut self,
-        _: Counted<'_>,
-        _: [&End; 2],
-        _: [&End; 2],
-    ) {
-    }
+    fn see(&mut self, _: Counted<'_>, _: [&End; 2]) {}
 }
 
 /// Checks collisions as validation does.
 impl<const REACHES: bool> Witness for Look<REACHES> {
     #[inline(always)]
-    fn see<K: Kind<ROWS>, const ROWS: usize>(
-        &mut self,
-        of: Counted<'_>,
-        ends: [&End; 2],
-        anchors: [&End; 2],
-    ) {
-        self.take(of, ends, &K::locations(of, anchors));
+    fn see(&mut self, of: Counted<'_>, ends: [&End; 2]) {
+        self.take(of, ends, &locations(of, ends));
     }
 }
 
-impl<'p, K, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
-    Encoding<K, L, E, Look<REACHES>, MOST_FULL>
+impl<'p, L: CollisionSource<'p>, E: Lookup<'p>, const REACHES: bool, const MOST_FULL: bool>
+    Encoding<L, E, Look<REACHES>, MOST_FULL>
 {
     /// Whether validation accepts the whole block, whose records must all be made before the call;
     /// and the number of collisions that are padding.
     #[inline(always)]
-    pub(crate) fn good<const ROWS: usize>(
-        self,
-        quick: &Quick<'_>,
-        block: &Block<'p, L>,
-    ) -> (bool, usize)
-    where
-        K: Kind<ROWS>,
-    {
+    pub(crate) fn good(self, quick: &Quick<'_>, block: &Block<'p, L>) -> (bool, usize) {
         let Self { ends, witness, .. } = self;
         // The witness reads these only if every record was made from its own bodies' ends, or is
         // padding.
         let locations = block
             .collisions
             .iter()
-            .map(|collision| K::locations(collision.into(), K::anchors(both(ends, collision))));
+            .map(|collision| locations(collision.into(), both(ends, collision)));
         witness.good(quick, block, ends, locations)
     }
 }
@@ -270,25 +134,20 @@ macro_rules! each {
 #[cfg(feature = "bench")]
 pub(crate) use each;
 
-impl<'p, K, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<K, L, E, W, MOST_FULL> {
+impl<'p, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<L, E, W, MOST_FULL> {
     /// The record of one collision of the block, which the witness sees.
     #[inline(always)]
-    fn record<const ROWS: usize>(&mut self, at: usize, of: Counted<'_>) -> Record<ROWS>
-    where
-        K: Kind<ROWS>,
-    {
+    fn record(&mut self, of: Counted<'_>) -> Record<{ collision::ROWS }> {
         let ends = both(self.ends, of.collision);
-        let anchors = K::anchors(ends);
-        let record = self.kind.encode(self.first + at, of, anchors);
-        self.witness.see::<K, ROWS>(of, ends, anchors);
+        let record = record::collision::encode(of, ends);
+        self.witness.see(of, ends);
         record
     }
 }
 
-impl<'p, K, L, E, W, const ROWS: usize, const MOST_FULL: bool> Records<ROWS>
-    for Encoding<K, L, E, W, MOST_FULL>
+impl<'p, L, E, W, const MOST_FULL: bool> Records<{ collision::ROWS }>
+    for Encoding<L, E, W, MOST_FULL>
 where
-    K: Kind<ROWS>,
     L: CollisionSource<'p>,
     E: Lookup<'p>,
     W: Witness,
@@ -307,9 +166,9 @@ where
             }
         }
         if MOST_FULL && these.iter().all(|collision| collision.count == FULL) {
-            each!(N, at => self.record(nth * N + at, Counted::full(these[at])).give(to));
+            each!(N, at => self.record(Counted::full(these[at])).give(to));
         } else {
-            each!(N, at => self.record(nth * N + at, these[at].into()).give(to));
+            each!(N, at => self.record(these[at].into()).give(to));
         }
         Some(())
     }

@@ -4,19 +4,18 @@
 //!
 //! The other channels have the same beats in every pass.
 
-use std::marker::PhantomData;
 use std::ops::Range;
 use std::slice::ChunksExactMut;
 
-use pgs_interface::profile::{Geometry, Variant};
-use pgs_interface::record::{Beat, LANES};
+use pgs_interface::profile::Variant;
+use pgs_interface::record::{Beat, LANES, collision};
 
-use super::encode::{Absolute, Encoding, Kind, Relative};
+use super::encode::Encoding;
 use super::pool::{PackPool, Stretch as _, ranges};
 use super::stripe_writer::BLOCK;
 use crate::beat::format::{Beats, Format, Join, Records as _, in_format};
 use crate::beat::stripe::Segment;
-use crate::record::body_table::{Ends, Lookup};
+use crate::record::body_table::{Ends, Lookup as _};
 use crate::record::sixteen::Sixteen;
 use crate::record::source::Contiguous;
 use crate::record::{Row, Rows};
@@ -97,8 +96,6 @@ struct Issue<'a> {
     variant: &'a Variant,
     /// Collisions of an issue.
     together: usize,
-    /// Rows of a collision with its impulses.
-    rows: usize,
     /// The collision beats of this channel: their numbers among all collision beats of the issue.
     places: [usize; BEATS_MAX],
     /// Number of collision beats on this channel.
@@ -109,11 +106,12 @@ impl<'a> Issue<'a> {
     fn of(variant: &'a Variant, channel: usize) -> Self {
         let layout = Segment::WarmCollisions.layout(variant);
         let together = variant.profile.collisions_per_issue as usize;
-        let beats = together * variant.collision_rows() / layout.rows_per_beat();
+        let beats = together * collision::ROWS / layout.rows_per_beat();
         let mut places = [0; BEATS_MAX];
         let on_channel = (0..beats).filter(|beat| layout.place(*beat).channel == channel);
         let count = places.iter_mut().zip(on_channel).map(|(to, beat)| *to = beat).count();
-        Self { variant, together, rows: layout.rows, places, count }
+        const _: () = assert!(collision::WARM_ROWS == collision::ROWS + 1);
+        Self { variant, together, places, count }
     }
 }
 
@@ -143,37 +141,20 @@ fn pack_range<C: Collisions + ?Sized>(
         }
         let block = Block { first, collisions: Contiguous(copies), ends };
         let to = [&mut contact, &mut friction];
-        macro_rules! written {
-            ($kind:expr) => {
-                in_wide_vectors(Writing {
-                    kind: $kind,
-                    rows: PhantomData,
-                    issue,
-                    block,
-                    impulses,
-                    to,
-                })
-            };
-        }
-        sums = sums.and(match issue.variant.profile.geometry {
-            Geometry::Absolute => written!(Absolute),
-            Geometry::Relative => written!(Relative),
-        });
+        sums = sums.and(in_wide_vectors(Writing { issue, block, impulses, to }));
     }
     sums
 }
 
 /// A block of collisions with their impulses, and its place in both segments.
-struct Writing<'p, 'a, K, const ROWS: usize> {
-    kind: K,
-    rows: PhantomData<[Lanes; ROWS]>,
+struct Writing<'p, 'a> {
     issue: &'p Issue<'p>,
     block: Block<'p, Contiguous<'p>>,
     impulses: &'p [Impulses],
     to: [&'p mut ChunksExactMut<'a, Beat>; 2],
 }
 
-impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, K, ROWS> {
+impl Work for Writing<'_, '_> {
     type Output = WarmSums;
 
     #[inline(always)]
@@ -186,22 +167,22 @@ impl<K: Kind<ROWS>, const ROWS: usize> Work for Writing<'_, '_, K, ROWS> {
 /// The impulses of one kind, as a row.
 type OfKind = fn(&Impulses) -> [f32; LANES];
 
-impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
+impl Writing<'_, '_> {
     #[inline(always)]
     fn run_as<V: Vectors, F: Format>(self, vectors: V) -> WarmSums {
-        let Self { kind, issue, block, impulses, to: [contact, friction], .. } = self;
+        let Self { issue, block, impulses, to: [contact, friction] } = self;
         let mut sums = WarmSums::default();
-        let Some(ends) = <K::Among<'p, F> as Lookup>::of(block.ends) else {
+        let Some(ends) = F::Among::of(block.ends) else {
             return WarmSums { broken: true, ..sums };
         };
-        let mut records = Encoding::<_, _, _, _, false>::new(kind, &block, ends, ());
+        let mut records = Encoding::<_, _, _, false>::new(&block, ends, ());
         for first in (0..impulses.len()).step_by(issue.together) {
             let of_issue = first..first + issue.together;
             let mut usual = Made::<V, F>::new(vectors);
             for nth in of_issue.clone() {
                 if records.some::<1>(nth, &mut usual).is_none() {
                     // Padding fills the issue up.
-                    usual.zeros(ROWS);
+                    usual.zeros(collision::ROWS);
                 }
             }
             sums.records = sums.records.wrapping_add(usual.sum);
@@ -221,7 +202,6 @@ impl<'p, K: Kind<ROWS>, const ROWS: usize> Writing<'p, '_, K, ROWS> {
                     let words =
                         impulses.get(nth).map_or([0; LANES], |all| of(all).map(f32::to_bits));
                     behind.row(Row { numbers: Lanes::new(words), integer: None });
-                    behind.zeros(issue.rows - ROWS - 1);
                 }
                 *last = behind.beats[0];
                 *sum = sum.wrapping_add(behind.sum);

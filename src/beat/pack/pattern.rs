@@ -1,6 +1,6 @@
 //! The stripes of the profiles, and their units, as constants of the compiler.
 
-use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, WINDOWED};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
 use crate::beat::stripe::Place;
 
@@ -12,8 +12,6 @@ pub(crate) enum Pattern {
     HalfBodies,
     /// A beat for each channel, in order; the name is the number of channels.
     One,
-    Two,
-    Three,
     Four,
 }
 
@@ -50,8 +48,6 @@ places! {
     HalfCollisions: HALF.stripes.collisions.streams;
     HalfBodies: HALF.stripes.poses.streams;
     One: NAIVE.stripes.collisions.streams;
-    Two: WINDOWED.stripes.collisions.streams;
-    Three: MIXED.stripes.collisions.streams;
     Four: FLOAT.stripes.poses.streams;
 }
 
@@ -72,16 +68,6 @@ macro_rules! units {
                 $each!(One: 1 are 1: a 1);
                 $each!(One: 1 are 2: a 2);
                 $each!(One: 1 are 4: a 4);
-            }
-            Pattern::Two => {
-                $each!(Two: 2 are 14: a 7, b 7);
-                $each!(Two: 1 are 6: a 3, b 3);
-                $each!(Two: 2 are 6: a 3, b 3);
-            }
-            Pattern::Three => {
-                $each!(Three: 2 are 6: a 2, b 2, c 2);
-                $each!(Three: 3 are 6: a 2, b 2, c 2);
-                $each!(Three: 3 are 12: a 4, b 4, c 4);
             }
             Pattern::Four => {
                 $each!(Four: 2 are 4: a 1, b 1, c 1, d 1);

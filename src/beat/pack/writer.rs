@@ -65,7 +65,7 @@ impl<'a> Writer<'a> {
         room: usize,
         channels: &'a mut [&'a mut [Beat]],
     ) -> Self {
-        let packer = CollisionPacker::new(target, ends, None, 0, channels);
+        let packer = CollisionPacker::new(target, ends, 0, channels);
         Self { packer: Some(packer), ..Self::without_bodies(target, ends, room) }
     }
 

@@ -4,10 +4,10 @@
 use bytemuck::Zeroable as _;
 use proptest::prelude::*;
 
-use crate::beat::pack::bodies::{Chosen, pack_poses, pack_velocities, survey};
+use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::PackPool;
-use crate::beat::pack::stripe_writer::{BLOCK, BODIES};
+use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::pack::target::Target;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Survey, Table};
@@ -16,7 +16,7 @@ use crate::scene::{
     Structures, Velocity,
 };
 use pgs_interface::number::{Numbers, StreamFormat};
-use pgs_interface::profile::{FLOAT, HALF, Inertia, MIXED, NAIVE, Variant, WINDOWED, WINDOWED16};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, Variant};
 use pgs_interface::record::Beat;
 
 /// Collisions in an order of their own. An index beyond the list is a collision without contact
@@ -74,7 +74,6 @@ struct Spec {
     whole: bool,
     collisions: Words,
     bodies: Words,
-    relative: bool,
     world: bool,
 }
 
@@ -86,7 +85,6 @@ const NAIVE_SPEC: Spec = Spec {
     whole: false,
     collisions: Words::F32,
     bodies: Words::F32,
-    relative: false,
     world: false,
 };
 const FLOAT_SPEC: Spec = Spec {
@@ -104,7 +102,6 @@ const HALF_SPEC: Spec = Spec {
     whole: true,
     collisions: Words::Binary16,
     bodies: Words::Binary16,
-    relative: false,
     world: false,
 };
 const THESIS_SPEC: Spec = Spec {
@@ -135,32 +132,8 @@ const LITERAL_SPEC: Spec = Spec {
     bodies: Words::Thesis16Literal,
     ..HALF_SPEC
 };
-const MIXED_SPEC: Spec = Spec {
-    variant: MIXED.default_variant(),
-    channels: 3,
-    collision_group: &[0, 1, 2],
-    body_group: &[0, 1, 2],
-    collisions: Words::Binary16,
-    relative: true,
-    ..NAIVE_SPEC
-};
-
-const WINDOWED_SPEC: Spec = Spec {
-    variant: WINDOWED.default_variant(),
-    channels: 4,
-    collision_group: &[0, 1],
-    relative: true,
-    ..NAIVE_SPEC
-};
-const WINDOWED16_SPEC: Spec = Spec {
-    variant: WINDOWED16.default_variant(),
-    collisions: Words::Binary16,
-    bodies: Words::Binary16,
-    ..WINDOWED_SPEC
-};
-
 fn any_spec() -> impl Strategy<Value = Spec> {
-    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, LITERAL_SPEC, MIXED_SPEC];
+    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, LITERAL_SPEC];
     (prop::sample::select(specs), any::<bool>()).prop_map(|(spec, world)| {
         let inertia = if world { Inertia::World } else { Inertia::Isotropic };
         Spec { variant: Variant { inertia, ..spec.variant }, world, ..spec }
@@ -287,47 +260,53 @@ const SHAPES: [Shape; 3] = [
     Shape { inverse_inertia: [1.0, 2.0, 3.0], ..Shape::isotropic(2.0, 0.0) },
 ];
 
+/// The beats of the velocities and of the poses.
+fn packed_bodies(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> [Vec<Vec<Beat>>; 2] {
+    let (mut ends, mut statics) = (Table::default(), Vec::new());
+    let into = Survey { ends: &mut ends, statics: &mut statics };
+    let (count, packers) = (bodies.len(), &mut PackPool::alone());
+    let mut velocities = Vec::new();
+    let poses = packed(spec, Segment::Poses, count, |poses| {
+        let mut of_poses = 0;
+        velocities = packed(spec, Segment::Velocities, count, |views| {
+            let places = (views, Some(poses));
+            let (sum, other, _) = pack_bodies(target(spec), bodies, count, into, places, packers);
+            of_poses = other;
+            sum
+        });
+        of_poses
+    });
+    [velocities, poses]
+}
+
 fn velocities(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
-    let count = bodies.len();
-    packed(spec, Segment::Velocities, count, |views| {
-        pack_velocities(target(spec), bodies, count, views, &mut PackPool::alone()).0
-    })
+    let [velocities, _] = packed_bodies(spec, bodies);
+    velocities
 }
 
 fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
-    let count = bodies.len();
-    packed(spec, Segment::Poses, count, |views| {
-        pack_poses(target(spec), bodies, count, views, &mut PackPool::alone()).0
-    })
+    let [_, poses] = packed_bodies(spec, bodies);
+    poses
 }
 
 fn target(spec: &Spec) -> Target<'_> {
     Target { variant: &spec.variant, shapes: &SHAPES, streamed_masses: false, quick: None }
 }
 
-/// The beats of collisions, with words in place of the bodies' indices.
-fn entries(
-    spec: &Spec,
-    bodies: &(impl Bodies + ?Sized),
-    collisions: &(impl Collisions + ?Sized),
-    words: Option<&[[u32; 2]]>,
-) -> Vec<Vec<Beat>> {
-    let count = collisions.len();
-    let (mut ends, mut statics) = (Table::default(), Vec::new());
-    let into = Survey { ends: &mut ends, statics: &mut statics };
-    survey(target(spec), bodies, bodies.len(), into, &mut PackPool::alone());
-    let entries = Entries { collisions, count, added: None, words };
-    packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(target(spec), ends.ends(), &entries, views, &mut PackPool::alone()).0
-    })
-}
-
+/// The beats of collisions.
 fn collisions(
     spec: &Spec,
     bodies: &(impl Bodies + ?Sized),
     collisions: &(impl Collisions + ?Sized),
 ) -> Vec<Vec<Beat>> {
-    entries(spec, bodies, collisions, None)
+    let count = collisions.len();
+    let (mut ends, mut statics) = (Table::default(), Vec::new());
+    let into = Survey { ends: &mut ends, statics: &mut statics };
+    survey(target(spec), bodies, bodies.len(), into, &mut PackPool::alone());
+    let entries = Entries { collisions, count, added: None };
+    packed(spec, Segment::Collisions, count, |views| {
+        pack_collisions(target(spec), ends.ends(), &entries, views, &mut PackPool::alone()).0
+    })
 }
 
 /// Any number that every format has a word for: within 65,504, tiny ones and both zeros among them.
@@ -384,10 +363,6 @@ prop_compose! {
     }
 }
 
-fn minus(to: [f32; 3], from: [f32; 3]) -> [f32; 3] {
-    [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
-}
-
 proptest! {
     #[test]
     fn velocities_arrive_as_they_were(
@@ -432,69 +407,23 @@ proptest! {
         bodies in prop::collection::vec(any_body(), 12..14),
         list in prop::collection::vec(any_collision(), 0..40),
     ) {
-        let per_collision = if spec.relative { 6 } else { 7 };
         let buffers = collisions(&spec, &bodies, &list);
-        let needed = per_collision * list.len();
+        let needed = 7 * list.len();
         let mut reader =
             Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, needed);
         for collision in &list {
             let ends = [collision.body_a, collision.body_b].map(|index| bodies[index as usize]);
-            let [mut a, mut b] = ends.map(|body| body.pose.position);
-            if spec.relative {
-                // A static body takes the position of the other body.
-                let [a_moves, b_moves] =
-                    ends.map(|body| SHAPES[body.shape as usize].inverse_mass != 0.0);
-                a = if a_moves { a } else { b };
-                b = if b_moves { b } else { a };
-            }
-            if spec.relative {
-                reader.vector(collision.normal, collision.body_a);
-                reader.vector(minus(b, a), collision.body_b);
-            } else {
-                reader.vector(collision.normal, collision.count);
-                reader.vector(a, collision.body_a);
-                reader.vector(b, collision.body_b);
-            }
+            let [a, b] = ends.map(|body| body.pose.position);
+            reader.vector(collision.normal, collision.count);
+            reader.vector(a, collision.body_a);
+            reader.vector(b, collision.body_b);
             for (ordinal, Contact { point, distance }) in (0..).zip(collision.contacts) {
                 if ordinal < collision.count {
-                    let [x, y, z] = if spec.relative { minus(point, a) } else { point };
+                    let [x, y, z] = point;
                     reader.numbers([x, y, z, distance]);
-                } else if spec.relative {
-                    reader.numbers([0.0, 0.0, 0.0, f32::INFINITY]);
                 } else {
                     reader.vector([0.0; 3], 0);
                 }
-            }
-        }
-        reader.end();
-    }
-
-    /// Places and marks replace the indices, and nothing else changes.
-    #[test]
-    fn marks_arrive_in_place_of_indices(
-        short in any::<bool>(),
-        bodies in prop::collection::vec(any_body(), 12..14),
-        list in prop::collection::vec(any_collision(), 0..40),
-        seed in 0_u32..0x8000,
-    ) {
-        let spec = if short { WINDOWED16_SPEC } else { WINDOWED_SPEC };
-        let words: Vec<[u32; 2]> =
-            (0..).zip(&list).map(|(at, _)| [seed, (seed + 77 * at) % 0x8000]).collect();
-        let count = list.len();
-        let marked = entries(&spec, &bodies, &list, Some(&words));
-        let plain = collisions(&spec, &bodies, &list);
-        let needed = 6 * count;
-        let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &marked, needed);
-        let mut other = Reader::new(&spec, spec.collision_group, spec.collisions, &plain, needed);
-        let row = |reader: &mut Reader| reader.rows.next().expect("as many as are needed");
-        for words in words {
-            for (at, word) in words.into_iter().enumerate() {
-                let (found, expected) = (row(&mut reader), row(&mut other));
-                prop_assert_eq!(&found[..3], &expected[..3]);
-                prop_assert_eq!(found[3], word, "row {}", at);
-            }
-            for _ in 0..4 {
-                prop_assert_eq!(row(&mut reader), row(&mut other));
             }
         }
         reader.end();
@@ -518,22 +447,6 @@ proptest! {
         let placed = Placed { list: &list, order: &order };
         prop_assert_eq!(&collisions(&spec, &bodies, &placed), &expected);
         prop_assert_eq!(&collisions(&spec, &bodies, &Given(&copied)), &expected);
-    }
-
-    /// The picks reach over several blocks. The chosen bodies are not adjacent in memory, so the
-    /// packer copies each of them.
-    #[test]
-    fn chosen_bodies_arrive_in_their_own_order(
-        spec in any_spec(),
-        bodies in prop::collection::vec(any_body(), 1..20),
-        picks in prop::collection::vec(any::<prop::sample::Index>(), 0..3 * BODIES),
-    ) {
-        let order: Vec<u32> =
-            picks.iter().map(|pick| u32::try_from(pick.index(bodies.len())).expect("few")).collect();
-        let chosen = Chosen { bodies: &bodies, order: &order };
-        let copied: Vec<Body> = order.iter().map(|index| bodies[*index as usize]).collect();
-        prop_assert_eq!(velocities(&spec, &chosen), velocities(&spec, &copied));
-        prop_assert_eq!(poses(&spec, &chosen), poses(&spec, &copied));
     }
 
     #[test]
@@ -593,8 +506,7 @@ fn a_body_that_does_not_exist_is_sent_with_a_position_of_zeros() {
     assert_eq!(buffers[2][0], Beat([0, 0, 0, u32::MAX]));
 }
 
-/// Where sixteen bits do not name all bodies, a profile sends all bits of an index, or another word
-/// in its place.
+/// Where sixteen bits do not name all bodies, a profile sends all bits of an index.
 #[test]
 fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
     let count = (1 << 16) + 2;
@@ -611,22 +523,13 @@ fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
     let contact = Contact { point: [5.0, 0.0, 0.0], distance: 0.25 };
     let list = [Collision { body_a, body_b, normal, count: 1, contacts: [contact; 4] }];
     assert_ne!(at(body_a).to_bits(), at(body_b).to_bits(), "they are told apart");
-    for spec in [NAIVE_SPEC, FLOAT_SPEC, WINDOWED_SPEC, WINDOWED16_SPEC] {
-        let words = spec.relative.then_some(&[[8, 9]][..]);
-        let buffers = entries(&spec, &bodies, list.as_slice(), words);
-        let rows = if spec.relative { 6 } else { 7 };
-        let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, rows);
-        let reach = if spec.relative {
-            reader.vector(normal, 8);
-            reader.vector([at(body_b) - at(body_a), 0.0, 0.0], 9);
-            5.0 - at(body_a)
-        } else {
-            reader.vector(normal, 1);
-            reader.vector([at(body_a), 0.0, 0.0], body_a);
-            reader.vector([at(body_b), 0.0, 0.0], body_b);
-            5.0
-        };
-        reader.numbers([reach, 0.0, 0.0, 0.25]);
+    for spec in [NAIVE_SPEC, FLOAT_SPEC] {
+        let buffers = collisions(&spec, &bodies, list.as_slice());
+        let mut reader = Reader::new(&spec, spec.collision_group, spec.collisions, &buffers, 7);
+        reader.vector(normal, 1);
+        reader.vector([at(body_a), 0.0, 0.0], body_a);
+        reader.vector([at(body_b), 0.0, 0.0], body_b);
+        reader.numbers([5.0, 0.0, 0.0, 0.25]);
     }
 }
 
@@ -635,7 +538,7 @@ fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
 #[test]
 fn more_bodies_than_a_stream_has_indices_for_are_refused() {
     let list = [Collision::NOTHING; BLOCK];
-    let entries = Entries { collisions: &list[..], count: BLOCK, added: None, words: None };
+    let entries = Entries { collisions: &list[..], count: BLOCK, added: None };
     for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
         let bodies = vec![Body { shape: 1, ..Body::zeroed() }; count];
         let (mut ends, mut statics) = (Table::default(), Vec::new());

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 
-use crate::beat::pack::bodies::{Chosen, pack_bodies, pack_poses, pack_velocities, survey};
+use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::{ChannelChunks, PackPool, RANGE, ranges, whole};
 use crate::beat::pack::stripe_writer::BLOCK;
@@ -19,7 +19,7 @@ use crate::scene::{
     Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Structures, Velocity,
 };
 use crate::validate::{Limits, Quick, preflight};
-use pgs_interface::profile::{Geometry, Inertia, PROFILES, Variant};
+use pgs_interface::profile::{Inertia, PROFILES, Variant};
 use pgs_interface::record::Beat;
 
 const SHAPES: [Shape; 3] = [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(2.0, 0.3)];
@@ -75,9 +75,6 @@ struct Input {
     limits: Limits,
     bodies: Vec<Body>,
     collisions: Vec<Collision>,
-    /// Some of the bodies, in an order of their own.
-    order: Vec<u32>,
-    words: Option<Vec<[u32; 2]>>,
     /// An order as long as `collisions`. Some of its indices name no collision.
     places: Vec<u32>,
 }
@@ -112,8 +109,8 @@ impl Collisions for Placed<'_> {
 #[derive(Debug, PartialEq)]
 struct Packed {
     channels: Vec<Vec<Beat>>,
-    sums: [u32; 5],
-    good: [bool; 4],
+    sums: [u32; 3],
+    good: [bool; 3],
     ends: [Table; 2],
     statics: [Vec<u32>; 2],
 }
@@ -121,7 +118,7 @@ struct Packed {
 impl Input {
     /// Packs the whole input.
     fn pack(&self, packers: &mut PackPool) -> Packed {
-        let Self { limits, bodies, collisions, order, places, .. } = self;
+        let Self { limits, bodies, collisions, places } = self;
         let parameters = StepParameters::default();
         let quick = preflight(bodies, collisions, &SHAPES, &parameters, limits).map(Quick::new);
         let quick = quick.expect("nothing else is wrong");
@@ -147,14 +144,6 @@ impl Input {
         let into = Survey { ends: second, statics: second_statics };
         let surveyed = survey(target, bodies, bodies.len(), into, packers);
 
-        let chosen = Chosen { bodies, order };
-        let [mut some_velocities, mut some_poses] =
-            [Segment::Velocities, Segment::Poses].map(|it| self.buffers(it, order.len()));
-        let views_of = &mut views(&mut some_velocities);
-        let (of_some, some_good) = pack_velocities(target, &chosen, order.len(), views_of, packers);
-        let views_of = &mut views(&mut some_poses);
-        let (of_other, other_good) = pack_poses(target, &chosen, order.len(), views_of, packers);
-
         let ends_of = ends[0].ends();
         let (records, (of_records, good)) = self.records(target, ends_of, collisions, packers);
         // Collisions in an order give the same records as copies in that order, with and without
@@ -169,9 +158,9 @@ impl Input {
         }
         assert!(self.records(unchecked, ends_of, collisions, packers).0 == records);
         Packed {
-            channels: [velocities, poses, some_velocities, some_poses, records].concat(),
-            sums: [of_velocities, of_poses, of_some, of_other, of_records],
-            good: [of_bodies, surveyed, some_good & other_good, good],
+            channels: [velocities, poses, records].concat(),
+            sums: [of_velocities, of_poses, of_records],
+            good: [of_bodies, surveyed, good],
             ends,
             statics,
         }
@@ -186,7 +175,7 @@ impl Input {
         packers: &mut PackPool,
     ) -> (Vec<Vec<Beat>>, (u32, bool)) {
         let count = collisions.len();
-        let entries = Entries { collisions, count, added: None, words: self.words.as_deref() };
+        let entries = Entries { collisions, count, added: None };
         let mut records = self.buffers(Segment::Collisions, count);
         let (sum, seen) =
             pack_collisions(target, ends, &entries, &mut views(&mut records), packers);
@@ -231,7 +220,6 @@ prop_compose! {
         variant in any_variant(),
         bodies in any_count(),
         collisions in any_count(),
-        chosen in any_count(),
         // The width of the window around its own index that a collision strays in.
         stray in prop::sample::select(vec![1, 900, u16::MAX]),
         still_of in prop::sample::select(vec![0, 1, 2, 50, 3000]),
@@ -246,9 +234,6 @@ prop_compose! {
         let few = u16::try_from(bodies.len()).expect("few");
         let mut collisions: Vec<Collision> =
             (0..collisions).map(|_| numbers.collision(few, others)).collect();
-        let order = (0..chosen).map(|_| numbers.below(few).into()).collect();
-        let words = (variant.profile.geometry == Geometry::Relative)
-            .then(|| collisions.iter().map(|_| [(); 2].map(|()| numbers.below(9000).into())).collect());
         let places = (0_u32..)
             .zip(&collisions)
             .map(|(at, _)| match numbers.below(50) {
@@ -263,7 +248,7 @@ prop_compose! {
         if let Some(collision) = collision.filter(|_| !collisions.is_empty()) {
             collision.get_mut(&mut collisions).normal = [0.5; 3];
         }
-        Input { limits: Limits::roomy(variant), bodies, collisions, order, words, places }
+        Input { limits: Limits::roomy(variant), bodies, collisions, places }
     }
 }
 
@@ -299,21 +284,15 @@ fn one_wrong_record_is_noticed_in_whichever_range() {
     for profile in PROFILES {
         let limits = Limits::roomy(profile.default_variant());
         let (bodies, collisions) = (bodies.clone(), Vec::clone(&collisions));
-        let (order, places) = (vec![], vec![]);
-        let mut input = Input { limits, bodies, collisions, order, words: None, places };
-        assert_eq!(input.pack(&mut packers).good, [true; 4], "{}", profile.name);
+        let mut input = Input { limits, bodies, collisions, places: vec![] };
+        assert_eq!(input.pack(&mut packers).good, [true; 3], "{}", profile.name);
         for at in [0, RANGE - 1, RANGE, 2 * RANGE, 2 * RANGE + 4] {
             let right = (input.bodies[at], input.collisions[at]);
             input.bodies[at].pose.position[1] = f32::NAN;
             assert_eq!(input.pack(&mut packers).good[..2], [false; 2], "{} {at}", profile.name);
             input.bodies[at] = right.0;
             input.collisions[at].normal = [0.5; 3];
-            assert_eq!(
-                input.pack(&mut packers).good,
-                [true, true, true, false],
-                "{}",
-                profile.name
-            );
+            assert_eq!(input.pack(&mut packers).good, [true, true, false], "{}", profile.name);
             input.collisions[at] = right.1;
         }
     }

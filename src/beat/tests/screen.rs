@@ -15,9 +15,7 @@ use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, StepParame
 use crate::validate::InputError;
 use crate::validate::{Limits, Quick, preflight, validate};
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{
-    FLOAT, Flow, Geometry, HALF, Inertia, MIXED, NAIVE, PROFILES, Variant, WINDOWED, WINDOWED16,
-};
+use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Variant};
 use pgs_interface::record::Beat;
 
 const SHAPES: [Shape; 4] = [
@@ -84,7 +82,7 @@ fn looked_at<C: Collisions + ?Sized>(
     let list: Vec<_> = (0..entries.count).map(|at| entries.collisions.collision(at)).collect();
     let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
     let mut views = views(&mut channels);
-    let packer = CollisionPacker::new(target, ends, entries.words, 0, &mut views);
+    let packer = CollisionPacker::new(target, ends, 0, &mut views);
     let mut packer = packer.expecting_few_full();
     let seen = packer.write(Contiguous(&list));
     // `pack_collisions` compares the number of paddings over all blocks; this loop does not.
@@ -148,14 +146,11 @@ fn said_and_doubted(
     assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));
     let count = schedule.map_or(collisions.len(), Schedule::len);
     let added = schedule.map(Schedule::empty);
-    // A windowed design always sends places instead of indices.
-    let places = vec![[8, 9]; count];
-    let words = matches!(variant.profile.flow, Flow::Window(_)).then_some(&places[..]);
     let good = match schedule {
-        None => looked_at(target, ends.ends(), &Entries { collisions, count, added, words }),
+        None => looked_at(target, ends.ends(), &Entries { collisions, count, added }),
         Some(schedule) => {
             let collisions = &Ordered { collisions, schedule };
-            looked_at(target, ends.ends(), &Entries { collisions, count, added, words })
+            looked_at(target, ends.ends(), &Entries { collisions, count, added })
         }
     };
     let valid = validate(bodies, collisions, shapes, &parameters, limits);
@@ -224,7 +219,7 @@ fn a_pile_is_found_good_at_once() {
     }
 }
 
-/// The properties are not vacuous: both verdicts occur for every geometry and width of rows.
+/// The properties are not vacuous: both verdicts occur for every width of rows.
 #[test]
 fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     let bodies: Vec<Body> = (0..BODIES)
@@ -243,16 +238,15 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
         collisions.iter_mut().step_by(50).for_each(|some| *some = collision);
         collisions
     }];
-    let profiles = [&FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
+    let profiles = [&FLOAT, &HALF];
     for (profile, collisions) in
         profiles.into_iter().flat_map(|of| piles.iter().map(move |it| (of, it)))
     {
-        let relative = profile.geometry == Geometry::Relative;
         let limits = limits(profile.default_variant(), true);
         let said = |bodies: &Vec<Body>, collisions: &Vec<Collision>| {
             let (good, valid) =
                 said(&limits, bodies, collisions, None).expect("nothing else wrong");
-            assert_eq!(good, valid.is_ok(), "{relative} {valid:?}");
+            assert_eq!(good, valid.is_ok(), "{valid:?}");
             good
         };
         assert!(said(&bodies, collisions));
@@ -339,7 +333,7 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
         count: 1,
         contacts: [Contact::default(); 4],
     };
-    for profile in [&NAIVE, &FLOAT, &WINDOWED, &WINDOWED16] {
+    for profile in [&NAIVE, &FLOAT] {
         let limits = limits(profile.default_variant(), false);
         // Two bodies are static, and all others move.
         for still in [[0, 1], [low, low + 1]] {
@@ -365,10 +359,9 @@ fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
         shape,
     };
     let contact = |x| Contact { point: [x, 2.0, 3.0], distance: -0.01 };
-    for profile in [&HALF, &MIXED, &WINDOWED16] {
-        let mut variant = profile.default_variant();
-        variant.numbers.rows = Precision::Binary16;
-        let limits = limits(variant, true);
+    {
+        let profile = &HALF;
+        let limits = limits(profile.default_variant(), true);
         for (near, far) in [(2, 2), (1, 2), (2, 1), (0, 2), (2, 0)] {
             let bodies = vec![at(1.0, near), at(17.0, far)];
             for (body_a, count) in (0..8).map(|case| (case % 2, 1 + case / 2)) {

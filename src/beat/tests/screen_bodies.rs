@@ -5,7 +5,7 @@ use crate::scene::{Body, Collision, Contact};
 use crate::validate::InputError;
 use crate::validate::Limits;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{Geometry, HALF, MIXED, PROFILES, Profile, WINDOWED16};
+use pgs_interface::profile::{HALF, PROFILES, Profile};
 
 /// Whether packing and validation accept these bodies in a profile, without collisions.
 fn said_of(profile: &'static Profile, bodies: &Vec<Body>) -> bool {
@@ -78,18 +78,12 @@ fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool),
     cases.map(said).collect()
 }
 
-/// The arm is computed although a static body does not turn. In relative records the position of
-/// the other body replaces that of the static body.
+/// The arm is computed although a static body does not turn.
 #[test]
 fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
-    for profile in [&HALF, &MIXED, &WINDOWED16] {
-        let mut variant = profile.default_variant();
-        variant.numbers.rows = Precision::Binary16;
-        let replaced = profile.geometry == Geometry::Relative;
-        for (distance, right) in [(30_000.0, true), (-50_000.0, replaced), (50_000.0, replaced)] {
-            for (found, of) in said_of_far(&limits(variant, true), distance, 0) {
-                assert_eq!(found, (right, right), "{of}");
-            }
+    for (distance, right) in [(30_000.0, true), (-50_000.0, false), (50_000.0, false)] {
+        for (found, of) in said_of_far(&limits(HALF.default_variant(), true), distance, 0) {
+            assert_eq!(found, (right, right), "{of}");
         }
     }
 }
@@ -98,18 +92,11 @@ fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
 /// that no arm is refused first.
 #[test]
 fn a_position_that_collisions_do_not_hold_is_noticed_whichever_body_it_is_of() {
-    for profile in [&HALF, &MIXED, &WINDOWED16] {
-        let mut variant = profile.default_variant();
-        variant.numbers = Numbers {
-            collisions: StreamFormat::Binary16,
-            poses: StreamFormat::F32,
-            rows: Precision::F32,
-            ..variant.numbers
-        };
-        for (distance, right) in [(60_000.0, true), (-70_000.0, false), (70_000.0, false)] {
-            for (found, of) in said_of_far(&limits(variant, true), distance, 1) {
-                assert_eq!(found, (right, right), "{of}");
-            }
+    let mut variant = HALF.default_variant();
+    variant.numbers = Numbers { poses: StreamFormat::F32, rows: Precision::F32, ..variant.numbers };
+    for (distance, right) in [(60_000.0, true), (-70_000.0, false), (70_000.0, false)] {
+        for (found, of) in said_of_far(&limits(variant, true), distance, 1) {
+            assert_eq!(found, (right, right), "{of}");
         }
     }
 }

@@ -11,20 +11,15 @@ use crate::beat::pack::target::Target;
 use crate::beat::stripe::{Place, Segment};
 use crate::record::body_table::{Survey, Table};
 use crate::scene::{Body, Collision, Contact, Impulses, Pose, Shape, Velocity, WarmCollisions};
-use pgs_interface::profile::{FLOAT, Geometry, HALF, MIXED, NAIVE, Profile, Variant};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile, Variant};
 use pgs_interface::record::Beat;
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
-const PROFILES: [&Profile; 4] = [&NAIVE, &FLOAT, &HALF, &MIXED];
+const PROFILES: [&Profile; 3] = [&NAIVE, &FLOAT, &HALF];
 const BODIES: u16 = 7;
 
 /// Beats of an issue in every pass, and in a warm pass, by hand.
-fn beats_of_issue(profile: &Profile) -> [usize; 2] {
-    match profile.geometry {
-        Geometry::Relative => [3, 4],
-        Geometry::Absolute => [7, 8],
-    }
-}
+const BEATS_OF_ISSUE: [usize; 2] = [7, 8];
 
 /// Buffers full of ones, so that a missing beat shows.
 fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
@@ -98,7 +93,7 @@ proptest! {
         survey(target, &bodies, bodies.len(), into, &mut packers);
         let mut usual = buffers(&variant, Segment::Collisions, count);
         let mut views: Vec<&mut [Beat]> = usual.iter_mut().map(Vec::as_mut_slice).collect();
-        let entries = Entries { collisions: &collisions, count, added: None, words: None };
+        let entries = Entries { collisions: &collisions, count, added: None };
         let (sum, _) = pack_collisions(target, table.ends(), &entries, &mut views, &mut packers);
 
         let channel = profile.mm2s_widths.len() - 1;
@@ -113,7 +108,7 @@ proptest! {
         prop_assert_eq!((sums.records, sums.broken), (sum, false));
 
         let layouts = [Segment::Collisions, Segment::WarmCollisions].map(|of| of.layout(&variant));
-        let [in_every_pass, all] = beats_of_issue(profile);
+        let [in_every_pass, all] = BEATS_OF_ISSUE;
         let together = profile.collisions_per_issue as usize;
         let mut written = 0;
         for (issue, first) in (0..count).step_by(together).enumerate() {

@@ -10,7 +10,6 @@ use super::stripe_reader::{self, Tally};
 use crate::beat::format::{Format, in_format};
 use crate::beat::pack::pattern::Pattern;
 use crate::beat::pack::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
-pub(crate) use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::stripe::{Deal, Layout};
 use crate::record::finite::Finite;
 use crate::record::result::Record;

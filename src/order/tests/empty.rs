@@ -72,13 +72,6 @@ proptest! {
             prop_assert_eq!(verified(found, &with_empty), verified(one.schedule(), &input));
             let measured = |schedule, input| OrderReport::measure(schedule, input, window);
             prop_assert_eq!(measured(found, &with_empty), measured(one.schedule(), &input));
-            let room = Room { places: 64, lag: 4_000, passes: 3, per_issue: 1 };
-            let lives = |schedule, input| {
-                let mut lives = Lives::default();
-                lives.assign_places(schedule, input, room).expect("there is room");
-                (lives.words().to_vec(), lives.velocities().to_vec(), lives.results().to_vec())
-            };
-            prop_assert_eq!(lives(found, &with_empty), lives(one.schedule(), &input));
         }
     }
 }

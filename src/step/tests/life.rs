@@ -23,8 +23,9 @@ use crate::{
 
 const CUBES: u32 = 20;
 
-pub(crate) fn windowed() -> BoardConfig {
-    let profile = Profile::by_name("windowed").expect("a profile");
+/// A board with the bits of `float`, on one stream.
+pub(crate) fn naive() -> BoardConfig {
+    let profile = Profile::by_name("naive").expect("a profile");
     BoardConfig { profile, ..BoardConfig::default() }
 }
 
@@ -233,7 +234,7 @@ fn a_panic_in_any_call_of_the_callers_containers_leaves_a_working_accelerator() 
     let cases = [
         (BoardConfig::default(), None),
         (BoardConfig::default(), Some(Order::HazardFree)),
-        (windowed(), None),
+        (naive(), None),
     ];
     for (config, order) in cases {
         let (board, mut accelerator) = open(config);
@@ -358,8 +359,8 @@ fn two_boards_in_one_process_do_not_know_of_each_other() {
 
     // The two boards alternate, each with a step in flight while the other works.
     let (left_board, mut left) = open(BoardConfig::default());
-    let (right_board, mut right) = open(windowed());
-    let right_alone = steps(30, &mut open(windowed()).1);
+    let (right_board, mut right) = open(naive());
+    let right_alone = steps(30, &mut open(naive()).1);
     let (mut left_bodies, left_collisions) = scene(7);
     let (mut right_bodies, right_collisions) = scene(30);
     let parameters = StepParameters::default();

@@ -8,7 +8,7 @@ use std::time::Duration;
 use bitstream_model::BoardConfig;
 use pgs_interface::profile::Profile;
 
-use super::life::{assert_works, windowed};
+use super::life::{assert_works, naive};
 use super::{bits, open, scene, undisturbed};
 use crate::board::bank::Bank;
 use crate::order::Order;
@@ -91,7 +91,7 @@ fn alternate(
 fn worlds_in_turn_give_the_bits_that_each_gives_alone() {
     for config in [
         BoardConfig::default(),
-        windowed(),
+        naive(),
         BoardConfig { profile: Profile::by_name("half").expect("it"), ..BoardConfig::default() },
     ] {
         for order in [None, Some(Order::HazardFree)] {
@@ -315,25 +315,24 @@ fn steps_of_any_size_are_prepared_beside_any_other() {
 
 #[test]
 fn a_step_with_nothing_to_stream_is_prepared_and_started() {
-    // Where the board keeps only live bodies, a static body alone needs no work.
-    let (board, mut accelerator) = open(windowed());
-    let still = vec![scene(1).0[0]];
+    let (board, mut accelerator) = open(BoardConfig::default());
+    let mut still: Vec<crate::Body> = Vec::new();
     let none: Vec<Collision> = Vec::new();
     let mut flight = accelerator.submit(&still, &none, &parameters()).expect("starts");
     let (mut bodies, collisions) = scene(CUBES);
     let next = flight.prepare(&bodies, &collisions, &parameters()).expect("packed");
-    let (ended, started) = flight.wait_and_start(&mut still.clone(), &next);
+    let (ended, started) = flight.wait_and_start(&mut still, &next);
     assert_eq!(ended.expect("nothing to do").doorbells, 0);
     let mut flight = started.expect("starts");
     let nothing = flight.prepare(&still, &none, &parameters()).expect("packed");
     let (ended, started) = flight.wait_and_start(&mut bodies, &nothing);
     ended.expect("a good step");
-    started.expect("nothing to start").wait(&mut still.clone()).expect("nothing to do");
+    started.expect("nothing to start").wait(&mut still).expect("nothing to do");
     drop(accelerator);
     assert_eq!(board.violations(), []);
 
     // With no step in flight and one prepared, the caller stops.
-    let (board, mut accelerator) = open(windowed());
+    let (board, mut accelerator) = open(BoardConfig::default());
     let mut flight = accelerator.submit(&still, &none, &parameters()).expect("starts");
     let _prepared = flight.prepare(&bodies, &collisions, &parameters()).expect("packed");
     drop(flight);

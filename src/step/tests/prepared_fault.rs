@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU32;
 
 use bitstream_model::{BoardConfig, Direction, Fault as Injected, FaultKind, FaultPlan};
 
-use super::life::{Panicking, assert_works, windowed};
+use super::life::{Panicking, assert_works, naive};
 use super::prepared::{CUBES, OTHER, assert_ends, assert_starts, parameters, prepare, submit};
 use super::{bits, open, scene};
 use crate::order::Order;
@@ -97,7 +97,7 @@ fn a_panic_in_any_call_while_preparing_leaves_the_step_in_flight() {
     for (config, order) in [
         (BoardConfig::default(), None),
         (BoardConfig::default(), Some(Order::HazardFree)),
-        (windowed(), None),
+        (naive(), None),
     ] {
         let (board, mut accelerator) = open(config);
         let parameters = StepParameters { order, ..parameters() };

@@ -4,9 +4,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bitstream_model::BoardConfig;
-use pgs_interface::profile::{Flow, PROFILES, Profile};
+use pgs_interface::profile::{PROFILES, Profile};
 
-use super::life::windowed;
 use super::{bits, open, scene};
 use crate::order::Order;
 use crate::{
@@ -53,7 +52,7 @@ fn assert_works(accelerator: &mut Accelerator, what: &str) {
 
 #[test]
 fn written_collisions_are_those_given_at_once() {
-    for profile in PROFILES.iter().filter(|profile| matches!(profile.flow, Flow::Passes)) {
+    for profile in PROFILES {
         let (board, mut accelerator) = open(BoardConfig { profile, ..BoardConfig::default() });
         let (given, collisions) = scene(CUBES);
         assert!(collisions.len() > 90, "more than three blocks");
@@ -159,12 +158,8 @@ fn what_needs_all_collisions_at_once_is_refused() {
     let (bodies, collisions) = scene(CUBES);
     let verified = StepParameters { verify_order: true, ..parameters() };
     let ordered = StepParameters { order: Some(Order::HazardFree), ..parameters() };
-    for (config, parameters) in [
-        (BoardConfig::default(), verified),
-        (BoardConfig::default(), ordered),
-        (windowed(), parameters()),
-    ] {
-        let (_, mut accelerator) = open(config);
+    for parameters in [verified, ordered] {
+        let (_, mut accelerator) = open(BoardConfig::default());
         let written = accelerator.write(&bodies, 999, &parameters, push_all(&collisions));
         assert_eq!(refusal(written), InputError::WrittenInOrder);
     }

@@ -124,7 +124,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(scene.shapes())?;
-    let window = IssueWindow::of(accelerator.capabilities(), &StepParameters::default())?;
+    let window = IssueWindow::of(accelerator.capabilities())?;
     let order = options.order.name();
     if !json {
         println!(

@@ -45,7 +45,7 @@ use bench::options::{Common, Pile, Sent};
 use bench::step::Step;
 use bench::{Clock, Run, STRETCH, milliseconds, ratio, warm_medians};
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::profile::{FLOAT, HALF, MIXED, Profile};
+use bitstream_model::interface::profile::{FLOAT, HALF, Profile};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
@@ -70,7 +70,7 @@ struct Options {
     /// Measure the time of the running thread, not the wall time
     #[arg(long, conflicts_with = "threads")]
     cpu_time: bool,
-    /// Measure this profile only: float, half or mixed
+    /// Measure this profile only: float or half
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
     /// The order for `in order`, one without hazards
@@ -84,7 +84,7 @@ struct Options {
 }
 
 /// One profile for each set of formats.
-const MEASURED: [&Profile; 3] = [&FLOAT, &HALF, &MIXED];
+const MEASURED: [&Profile; 2] = [&FLOAT, &HALF];
 
 impl Options {
     fn profiles(&self) -> Result<Vec<&'static Profile>, String> {

@@ -85,7 +85,7 @@ impl Step {
     /// There is no such order.
     pub fn schedule(&self, config: BoardConfig, order: Order) -> Result<Schedule, Box<dyn Error>> {
         let accelerator = open(config, &self.shapes)?;
-        let window = IssueWindow::of(accelerator.capabilities(), &self.parameters)?;
+        let window = IssueWindow::of(accelerator.capabilities())?;
         let mut buffers = InputBuffers::new();
         let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
         Ok(Orderer::new().order(&input, order, window)?.clone())

@@ -168,12 +168,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_that_a_design_with_passes_has_is_there() {
+    fn every_code_is_there() {
         for inertia in [Inertia::Isotropic, Inertia::World] {
             let all = refusals(inertia, 1, 1);
             for code in ErrorCode::ALL {
-                let windowed = matches!(code, ErrorCode::EmptyPlace | ErrorCode::Deadlock);
-                assert_eq!(all.iter().any(|refusal| refusal.code == code), !windowed, "{code:?}");
+                assert!(all.iter().any(|refusal| refusal.code == code), "{code:?}");
             }
         }
     }

@@ -94,8 +94,7 @@ impl Replacement {
         if let Some(earlier) = earlier {
             make_like(&file, &earlier);
         }
-        // Some file systems report a full disk only here, and some cannot do it at all.
-        file.sync_all().or_else(|error| if is_lost(&error) { Err(error) } else { Ok(()) })
+        sync(&file)
     }
 
     /// Gives every file its name.
@@ -193,6 +192,15 @@ fn make_like(file: &File, earlier: &Metadata) {
     }
     // After the owner, whose change takes bits of the mode away.
     let _ = file.set_permissions(earlier.permissions());
+}
+
+/// Has a file's data reach the disk, where the file system and the sandbox have such a call.
+///
+/// # Errors
+///
+/// The data did not reach the disk; some file systems report a full one only here.
+pub fn sync(file: &File) -> io::Result<()> {
+    file.sync_all().or_else(|error| if is_lost(&error) { Err(error) } else { Ok(()) })
 }
 
 /// Whether an error of `fsync` says that data did not reach the disk. Every other one says that the file

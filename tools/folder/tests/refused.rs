@@ -1,12 +1,13 @@
 //! A file is replaced where a file system or a sandbox refuses to set its owner and mode, or to sync it.
 
-#![allow(unsafe_code, clippy::cast_possible_truncation, reason = "a filter of system calls")]
+mod filter;
 
 use std::fs::{self, Permissions};
 use std::io::{self, Write as _};
 use std::os::unix::fs::{PermissionsExt as _, chown};
 
-use nix::libc::{self, sock_filter, sock_fprog};
+use filter::refuse;
+use nix::libc;
 use pgs_support::in_forked_child;
 use step_folder::replace::replace;
 
@@ -54,26 +55,4 @@ fn a_file_is_replaced_where_owner_mode_and_fsync_are_refused() {
     });
     assert_eq!(full, Some(1), "what did not reach the disk is no result");
     assert_eq!(fs::read_to_string(&path).expect("there"), "new");
-}
-
-/// Lets system calls of this process end with an error.
-fn refuse(calls: &[libc::c_long], errno: i32) -> Result<(), ()> {
-    let filter = |code: u32, jt, jf, k| sock_filter { code: code as u16, jt, jf, k };
-    let action =
-        |action, data: i32| filter(libc::BPF_RET | libc::BPF_K, 0, 0, action | (data as u32));
-    // The number of a call is the first word of its data.
-    let mut filters = vec![filter(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, 0)];
-    for call in calls {
-        filters.push(filter(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, 0, 1, *call as u32));
-        filters.push(action(libc::SECCOMP_RET_ERRNO, errno));
-    }
-    filters.push(action(libc::SECCOMP_RET_ALLOW, 0));
-    let program = sock_fprog { len: filters.len() as u16, filter: filters.as_mut_ptr() };
-    let [yes, none] = [1, 0_u64];
-    // SAFETY: it takes numbers alone.
-    let set = unsafe { libc::prctl(libc::PR_SET_NO_NEW_PRIVS, yes, none, none, none) };
-    let mode = u64::from(libc::SECCOMP_MODE_FILTER);
-    // SAFETY: `program` leads to `filters`; both live through the call, which copies them.
-    let filtered = unsafe { libc::prctl(libc::PR_SET_SECCOMP, mode, &raw const program) };
-    if set == 0 && filtered == 0 { Ok(()) } else { Err(()) }
 }

@@ -1,7 +1,7 @@
 //! Chooses how a board is built.
 
 use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{Flow, HALF, Inertia, PROFILES, Variant};
+use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Variant};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
 
 use crate::input::Input;
@@ -12,13 +12,12 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
     let Variant { profile, numbers, inertia } = variant(input);
     let switches = input.byte();
     let on = |bit: u32| switches >> bit & 1 == 1;
-    let unchecked = on(0) && profile.flow == Flow::Passes;
     let small = |input: &mut Input<'_>, most: u32| u64::from(input.below(most));
     BoardConfig {
         profile,
         numbers: Some(numbers),
         inertia,
-        hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
+        hazards: if on(0) { Hazards::Unchecked } else { Hazards::Interlocked },
         // In the profiles' own windows, an order without hazards needs hundreds of empty entries.
         window_slots: if on(1) && on(4) { None } else { Some(1 + input.below(24)) },
         subnormals: if on(2) { Subnormals::Flush } else { Subnormals::Keep },

@@ -11,8 +11,6 @@
 //! # Ok::<(), &str>(())
 //! ```
 
-#![forbid(unsafe_code)]
-
 pub mod boards;
 pub mod campaign;
 pub mod finding;

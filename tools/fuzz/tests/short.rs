@@ -55,6 +55,36 @@ fn faults() {
 }
 
 #[test]
+fn requests() {
+    let tally = short("requests", 300).tally;
+    assert!(tally.registers > 200 && tally.refused > 20, "{tally:?}");
+}
+
+#[test]
+fn answers() {
+    let tally = short("answers", 60).tally;
+    assert!(tally.steps > 5 && tally.refused > 5, "{tally:?}");
+}
+
+#[test]
+fn devices() {
+    let tally = short("devices", 400).tally;
+    assert!(tally.steps > 40 && tally.refused > 40, "{tally:?}");
+}
+
+#[test]
+fn loads() {
+    let tally = short("loads", 2000).tally;
+    assert!(tally.steps > 200 && tally.refused > 500, "{tally:?}");
+}
+
+#[test]
+fn calls() {
+    let tally = short("calls", 400).tally;
+    assert!(tally.steps > 20 && tally.refused > 200, "{tally:?}");
+}
+
+#[test]
 fn the_shortest_inputs_are_taken_too() {
     for target in targets::ALL {
         for input in [&[][..], &[0], &[255], &[0; 64], &[255; 64]] {

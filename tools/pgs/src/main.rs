@@ -18,7 +18,6 @@ mod failure;
 mod footprint;
 mod histogram;
 mod interrupt;
-mod loading;
 mod narrow;
 mod numbers;
 mod options;

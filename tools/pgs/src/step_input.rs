@@ -123,9 +123,7 @@ fn file_of_excess(excess: &Excess) -> &'static str {
         Excess::Anisotropic { .. } => BODY_INVERSE_INERTIA,
         Excess::TooManyCollisions { .. }
         | Excess::MemoryExceeded { .. }
-        | Excess::OrderTooLong { .. }
-        | Excess::SpanTooLong { .. }
-        | Excess::TooManyLive { .. } => COLLISION_BODIES,
+        | Excess::OrderTooLong { .. } => COLLISION_BODIES,
         // Too many bodies.
         _ => BODY_POSITION,
     }

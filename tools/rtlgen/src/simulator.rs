@@ -2,6 +2,7 @@
 //! `bitstream-model/rtl/simulator/main.cpp` into a process that an emulated board talks to.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use crate::design::Design;
@@ -18,13 +19,30 @@ pub const PROGRAM: &str = "pgs-rtl";
 ///
 /// # Errors
 ///
-/// The folder or a file cannot be written.
+/// The folder or a file cannot be written, or two files are one.
 pub fn write(folder: &Path, files: &[File]) -> Result<(), Error> {
     fs::create_dir_all(folder).map_err(Error::io("make the folder"))?;
+    let taken = ["/dev/stdout", "/dev/stderr"].map(PathBuf::from);
+    let mut taken: Vec<_> = taken.into_iter().filter_map(identity).collect();
+    for path in files.iter().map(|file| folder.join(&file.name)) {
+        let Some(found) = identity(path) else { continue };
+        if let Some((.., other)) =
+            taken.iter().find(|other| (found.0, found.1) == (other.0, other.1))
+        {
+            return Err(Error::OneFile { path: found.2, other: other.clone() });
+        }
+        taken.push(found);
+    }
     for File { name, text } in files {
         fs::write(folder.join(name), text).map_err(Error::io("write a file of the design"))?;
     }
     Ok(())
+}
+
+/// The device and the inode of a file that is there, and its path: equal for every link to the file.
+fn identity(path: PathBuf) -> Option<(u64, u64, PathBuf)> {
+    let found = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?;
+    Some((found.dev(), found.ino(), path))
 }
 
 /// Whether a simulator can write waveforms, which makes it slower.

@@ -68,7 +68,6 @@ pub(crate) fn stage(stage: Stage) -> String {
         Stage::Friction(pass) => format!("friction {pass}"),
         Stage::Integrate => "integrate".to_owned(),
         Stage::SendVelocities => "send".to_owned(),
-        Stage::Window => "window".to_owned(),
     }
 }
 

@@ -62,7 +62,7 @@ impl Scale {
 fn stage_class(stage: Stage) -> &'static str {
     match stage {
         Stage::Load => "vel",
-        Stage::Contact(_) | Stage::Window => "con",
+        Stage::Contact(_) => "con",
         Stage::Friction(_) => "fri",
         Stage::Integrate => "pos",
         Stage::SendVelocities => "res",

@@ -7,11 +7,10 @@
 pub mod solver;
 pub mod table;
 
-pub use table::{FLOAT, HALF, MIXED, NAIVE, PROFILES, WINDOWED, WINDOWED16};
+pub use table::{FLOAT, HALF, NAIVE, PROFILES};
 
 use super::number::{Numbers, StreamFormat};
-use super::record::collision as absolute;
-use super::record::{LANES, pose, relative, result, velocity};
+use super::record::{LANES, collision, pose, result, velocity};
 use super::stripe::Stripes;
 
 /// Depth of one kind of pass, clock cycles.
@@ -40,16 +39,6 @@ pub struct RecordWords {
 pub const THESIS_WORDS: RecordWords =
     RecordWords { velocity: 6, collision: 27, pose: 7, result: 6 };
 
-/// Which collision record is streamed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Geometry {
-    /// Both positions and the contact points in world coordinates
-    /// ([`record::collision`](super::record::collision)).
-    Absolute,
-    /// Everything relative to body A ([`record::relative`](super::record::relative)).
-    Relative,
-}
-
 /// How a bitstream knows the inertia of its bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Inertia {
@@ -59,63 +48,6 @@ pub enum Inertia {
     /// The inverse inertia of every body about world axes, six numbers that are streamed with its
     /// velocity and kept on chip: boxes, capsules, anything.
     World,
-}
-
-/// How the passes over the collisions run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Flow {
-    /// One after the other: each streams all collisions, and the velocities of all bodies are on
-    /// chip.
-    Passes,
-    /// One behind the other while the collisions stream once. The velocity of a body streams in
-    /// with its first use, its pose after its last, and only live bodies are on chip.
-    Window(Window),
-}
-
-/// Units, places and delay lines of a design that streams the collisions once.
-///
-/// With P passes, entry n of pass k may issue when
-///
-/// - entry n - 1 has issued to pass k,
-/// - pass k - 1 has written back the last use of both its bodies,
-/// - the previous use of each of its bodies in pass k is written back, and
-/// - the delay line behind pass k has room for it.
-///
-/// A unit takes an issue every initiation interval, from its passes in turn, and passes over a pass
-/// that cannot issue. When all of them can, every pass gets one entry in
-/// [`slot_cycles`](Self::slot_cycles). Pass k of a kind runs on unit k modulo the number of units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Window {
-    /// Units that run contact passes.
-    pub contact_units: u32,
-    /// Units that run friction passes.
-    pub friction_units: u32,
-    /// Places for live bodies over all units; place 0 stands for every static body. Each unit
-    /// keeps the bodies in its passes in a memory of its share, at the place modulo its size.
-    pub slots: u32,
-    /// Most collisions that wait between one pass and the next: a body's first and last use must
-    /// be less than this number apart.
-    pub lag: u32,
-}
-
-impl Window {
-    /// Most collisions of a step, empty entries included: what the counters of the passes hold.
-    pub const COLLISIONS_MAX: u32 = 1 << 20;
-
-    /// Cycles in which every pass issues one entry.
-    #[must_use]
-    pub const fn slot_cycles(
-        &self,
-        contact_passes: u32,
-        friction_passes: u32,
-        initiation_interval: u32,
-        collisions_per_issue: u32,
-    ) -> u32 {
-        let contact = contact_passes.div_ceil(self.contact_units);
-        let friction = friction_passes.div_ceil(self.friction_units);
-        let most = if contact > friction { contact } else { friction };
-        (most * initiation_interval).div_ceil(collisions_per_issue)
-    }
 }
 
 /// On-chip memory.
@@ -140,8 +72,6 @@ pub struct Profile {
     pub id: u32,
     /// Name on the command line and in reports.
     pub name: &'static str,
-    /// The collision record.
-    pub geometry: Geometry,
     /// Formats, unless the bitstream was built with others of the same widths on the streams.
     pub numbers: Numbers,
     /// Width of each MM2S stream, bits.
@@ -155,8 +85,6 @@ pub struct Profile {
     /// Collisions that enter the pipeline together. A last issue that is not full is filled up with
     /// padding collisions.
     pub collisions_per_issue: u32,
-    /// How the passes run.
-    pub flow: Flow,
     /// Contact pipeline with isotropic inertia; [`Variant::contact`] has the one of a build.
     pub contact: Depth,
     /// Friction pipeline with isotropic inertia.
@@ -244,24 +172,6 @@ impl Variant {
         }
     }
 
-    /// Rows of a collision record.
-    #[must_use]
-    pub const fn collision_rows(&self) -> usize {
-        match self.profile.geometry {
-            Geometry::Absolute => absolute::ROWS,
-            Geometry::Relative => relative::ROWS,
-        }
-    }
-
-    /// Rows of a collision record of a warm pass.
-    #[must_use]
-    pub const fn warm_collision_rows(&self) -> usize {
-        match self.profile.geometry {
-            Geometry::Absolute => absolute::WARM_ROWS,
-            Geometry::Relative => relative::WARM_ROWS,
-        }
-    }
-
     /// 32-bit words of the records on the streams.
     #[must_use]
     pub const fn words(&self) -> RecordWords {
@@ -273,19 +183,15 @@ impl Variant {
         let (bodies, poses) = (self.numbers.bodies, self.numbers.poses);
         RecordWords {
             velocity: words(self.velocity_rows(), bodies),
-            collision: words(self.collision_rows(), self.numbers.collisions),
+            collision: words(collision::ROWS, self.numbers.collisions),
             pose: words(pose::ROWS, poses),
             result: words(result::ROWS, poses),
         }
     }
 
-    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia. 0 in a design
-    /// that keeps live bodies only: its memory does not depend on the scene.
+    /// On-chip bytes that a body takes: all copies of its velocity, and its inertia.
     #[must_use]
     pub const fn bytes_per_body(&self) -> u32 {
-        if let Flow::Window(_) = self.profile.flow {
-            return 0;
-        }
         let velocities =
             SIX * self.numbers.velocities.bytes() * self.profile.memory.velocity_copies;
         let inertia = match self.inertia {
@@ -295,13 +201,9 @@ impl Variant {
         velocities + inertia
     }
 
-    /// On-chip bytes that a collision takes: its accumulated impulses. 0 in a design that keeps
-    /// live bodies only, as in [`bytes_per_body`](Self::bytes_per_body).
+    /// On-chip bytes that a collision takes: its accumulated impulses.
     #[must_use]
     pub const fn bytes_per_collision(&self) -> u32 {
-        if let Flow::Window(_) = self.profile.flow {
-            return 0;
-        }
         FOUR * self.numbers.impulses.bytes()
     }
 
@@ -309,9 +211,6 @@ impl Variant {
     /// that is smaller.
     #[must_use]
     pub fn body_capacity(&self) -> u32 {
-        if let Flow::Window(_) = self.profile.flow {
-            return self.profile.body_capacity;
-        }
         let by_index = self.numbers.collisions.largest_index().saturating_add(1);
         self.profile.body_capacity.min(by_index)
     }

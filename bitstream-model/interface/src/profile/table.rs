@@ -5,8 +5,8 @@
 //! Verilog: their depths are assumed, from an earlier pipeline of two cycles a collision, and so is
 //! their fill of the integration, from `float`.
 
-use super::{Depth, Flow, Geometry, OnChipMemory, Profile, Window};
-use crate::number::{Numbers, StreamFormat};
+use super::{Depth, OnChipMemory, Profile};
+use crate::number::Numbers;
 use crate::stripe::{Stripe, Stripes};
 
 /// Pipelines of `float`: schedules of the generated Verilog.
@@ -42,7 +42,6 @@ const ONE_COPY: OnChipMemory =
 pub const NAIVE: Profile = Profile {
     id: 2,
     name: "naive",
-    geometry: Geometry::Absolute,
     numbers: Numbers::F32,
     mm2s_widths: &[32],
     s2mm_widths: &[32],
@@ -53,7 +52,6 @@ pub const NAIVE: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0], padded: false }),
     initiation_interval: 28,
     collisions_per_issue: 1,
-    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     world_contact: CONTACT,
@@ -70,7 +68,6 @@ pub const NAIVE: Profile = Profile {
 pub const FLOAT: Profile = Profile {
     id: 1,
     name: "float",
-    geometry: Geometry::Absolute,
     numbers: Numbers::F32,
     mm2s_widths: &[128; 4],
     s2mm_widths: &[128; 4],
@@ -81,7 +78,6 @@ pub const FLOAT: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
     initiation_interval: 2,
     collisions_per_issue: 1,
-    flow: Flow::Passes,
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
     world_contact: FLOAT_WORLD_CONTACT,
@@ -99,7 +95,6 @@ pub const FLOAT: Profile = Profile {
 pub const HALF: Profile = Profile {
     id: 3,
     name: "half",
-    geometry: Geometry::Absolute,
     numbers: Numbers::BINARY16,
     mm2s_widths: &[128, 128, 64],
     s2mm_widths: &[128, 128, 64],
@@ -110,7 +105,6 @@ pub const HALF: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0, 0, 0, 1, 1, 1, 2, 2], padded: true }),
     initiation_interval: 3,
     collisions_per_issue: 2,
-    flow: Flow::Passes,
     contact: CONTACT,
     friction: FRICTION,
     world_contact: CONTACT,
@@ -123,83 +117,5 @@ pub const HALF: Profile = Profile {
     source: "thesis §5.5, §4.4.2",
 };
 
-/// Three 128-bit streams, collisions relative to body A in binary16, everything else in f32, one
-/// collision a cycle at 250 MHz with block RAM at twice that clock. This project's.
-pub const MIXED: Profile = Profile {
-    id: 4,
-    name: "mixed",
-    geometry: Geometry::Relative,
-    numbers: Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 },
-    mm2s_widths: &[128; 3],
-    s2mm_widths: &[128; 3],
-    stripes: Stripes::new(
-        Stripe { streams: &[0, 1, 2], padded: false },
-        Stripe { streams: &[0, 1, 2], padded: false },
-    )
-    .with_warm_collisions(Stripe { streams: &[0, 1, 2, 2], padded: false }),
-    initiation_interval: 1,
-    collisions_per_issue: 1,
-    flow: Flow::Passes,
-    contact: CONTACT,
-    friction: FRICTION,
-    world_contact: CONTACT,
-    world_friction: FRICTION,
-    integration_fill: INTEGRATION_FILL,
-    clock_khz: 250_000,
-    memory: OnChipMemory { pump: 2, ..ONE_COPY },
-    body_capacity: 131_072,
-    shape_capacity: 64,
-    source: "this project",
-};
-
-/// Collisions on two streams, velocities and poses on one each, results on all four: records that
-/// are needed at different times do not wait for each other.
-const WINDOWED_STRIPES: Stripes = Stripes {
-    collisions: Stripe { streams: &[0, 1], padded: false },
-    warm_collisions: None,
-    velocities: Stripe { streams: &[2], padded: false },
-    poses: Stripe { streams: &[3], padded: false },
-    results: Stripe { streams: &[0, 1, 2, 3], padded: false },
-};
-
-/// Two contact and two friction units, each with half of the passes.
-const WINDOW: Window = Window { contact_units: 2, friction_units: 2, slots: 8192, lag: 2816 };
-
-/// Collisions stream once while eight passes run one behind the other, f32, relative coordinates
-/// (thesis §4.7 and §7.3 propose it). This project's.
-pub const WINDOWED: Profile = Profile {
-    id: 5,
-    name: "windowed",
-    geometry: Geometry::Relative,
-    numbers: Numbers::F32,
-    mm2s_widths: &[128; 4],
-    s2mm_widths: &[128; 4],
-    stripes: WINDOWED_STRIPES,
-    initiation_interval: 2,
-    collisions_per_issue: 1,
-    flow: Flow::Window(WINDOW),
-    contact: CONTACT,
-    friction: FRICTION,
-    world_contact: CONTACT,
-    world_friction: FRICTION,
-    integration_fill: INTEGRATION_FILL,
-    clock_khz: 275_000,
-    memory: OnChipMemory { pump: 2, ..ONE_COPY },
-    body_capacity: 1 << 20,
-    shape_capacity: 64,
-    source: "this project, after thesis §4.7",
-};
-
-/// `windowed` with sixteen-bit arithmetic, collisions and velocities in binary16, poses in f32.
-/// This project's.
-pub const WINDOWED16: Profile = Profile {
-    id: 6,
-    name: "windowed16",
-    numbers: Numbers { poses: StreamFormat::F32, ..Numbers::BINARY16 },
-    initiation_interval: 3,
-    collisions_per_issue: 2,
-    ..WINDOWED
-};
-
 /// Every profile.
-pub const PROFILES: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WINDOWED16];
+pub const PROFILES: &[&Profile] = &[&NAIVE, &FLOAT, &HALF];

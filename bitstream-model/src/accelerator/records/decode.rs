@@ -9,8 +9,7 @@ use crate::accelerator::integrate::Pose;
 use crate::accelerator::solver::Velocity;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{
-    Beat, CONTACT_POINTS, LANES, WORD_LANE, collision, pose, relative, result, velocity,
-    velocity_result,
+    Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity, velocity_result,
 };
 
 /// The number in a word of a format.
@@ -62,9 +61,9 @@ pub(crate) struct Collision {
 }
 
 impl Collision {
-    /// A record in world coordinates.
+    /// A record.
     #[inline(always)]
-    pub(crate) fn absolute(format: StreamFormat, rows: &[Row; collision::ROWS]) -> Self {
+    pub(crate) fn of(format: StreamFormat, rows: &[Row; collision::ROWS]) -> Self {
         let contact = |k: usize| vec4(format, rows[collision::CONTACTS + k]);
         Self {
             body_a: rows[collision::BODY_A][WORD_LANE],
@@ -79,14 +78,14 @@ impl Collision {
         }
     }
 
-    /// A record in world coordinates and f32, with the friction of the pair above its count.
+    /// A record in f32, with the friction of the pair above its count.
     #[inline(always)]
     pub(crate) fn with_friction(rows: &[Row; collision::ROWS]) -> Self {
         let word = rows[collision::NORMAL][WORD_LANE];
         Self {
             count: (word & !collision::FRICTION_BITS) as usize,
             friction: pair_friction(word),
-            ..Self::absolute(StreamFormat::F32, rows)
+            ..Self::of(StreamFormat::F32, rows)
         }
     }
 
@@ -94,38 +93,6 @@ impl Collision {
     #[inline(always)]
     pub(crate) fn with_impulses(self, format: StreamFormat, impulses: Row) -> Self {
         Self { impulses: vec4(format, impulses), ..self }
-    }
-
-    /// A record relative to body A, which then stands at the origin. Points at a distance of
-    /// +infinity are left out.
-    #[inline(always)]
-    pub(crate) fn relative(format: StreamFormat, rows: &[Row; relative::ROWS]) -> Self {
-        // One loop decodes all words, so that the compiler vectorises it; the words that hold an
-        // index are decoded for nothing.
-        let mut numbers = [[0.0_f32; LANES]; relative::ROWS];
-        for (to, word) in numbers.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
-            *to = number(format, *word);
-        }
-        let mut contacts = [[0.0; 4]; CONTACT_POINTS];
-        let mut count = 0;
-        for contact in &numbers[relative::CONTACTS..] {
-            if contact[WORD_LANE].to_bits() != f32::INFINITY.to_bits() {
-                contacts[count] = *contact;
-                count += 1;
-            }
-        }
-        let vec3 = |[x, y, z, _]: [f32; LANES]| [x, y, z];
-        Self {
-            body_a: rows[relative::NORMAL][WORD_LANE],
-            body_b: rows[relative::OFFSET][WORD_LANE],
-            count,
-            friction: 0.0,
-            normal: vec3(numbers[relative::NORMAL]),
-            position_a: [0.0; 3],
-            position_b: vec3(numbers[relative::OFFSET]),
-            contacts,
-            impulses: [0.0; CONTACT_POINTS],
-        }
     }
 }
 

@@ -29,11 +29,6 @@ impl Results {
         self.array.cycles(self.done)
     }
 
-    /// Clock cycles that the streams take for one record alone.
-    pub(crate) fn cycles_of_one(&self) -> u64 {
-        self.array.cycles(1)
-    }
-
     /// Records that the streams have space for; the last one counts with the padding behind it.
     pub(crate) fn room(&self, streams: &[Stream]) -> usize {
         let room = self.array.striping.contiguous(|k| self.sent[k] + streams[k].space());

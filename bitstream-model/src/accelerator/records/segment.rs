@@ -230,7 +230,7 @@ mod tests {
         let striping = Striping::new(&profile.stripes.collisions, profile.mm2s_widths);
         let format = variant.numbers.collisions;
         let together = profile.collisions_per_issue as usize;
-        let rows = variant.collision_rows();
+        let rows = pgs_interface::record::collision::ROWS;
         Segment::new(Array::new(striping, Records { format, rows, count, together }))
     }
 

@@ -191,7 +191,7 @@ impl Step {
             let warm = !self.given.is_empty() && (pass == 0 || pass == contact);
             for (index, (rows, impulses)) in self.records.iter().zip(&mut impulses).enumerate() {
                 let given = self.given.get(index).filter(|_| warm).map(|given| &given[kind]);
-                let collision = Collision::absolute(StreamFormat::F32, rows);
+                let collision = Collision::of(StreamFormat::F32, rows);
                 if collision.count == 0 {
                     continue;
                 }

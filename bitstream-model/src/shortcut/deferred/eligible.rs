@@ -4,7 +4,7 @@ use crate::accelerator::records::striping::{PerStream, Striping, Turns};
 use crate::config::{BoardConfig, Hazards, Subnormals, beat_cycles};
 use crate::shortcut::batch;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{Flow, Geometry, Inertia};
+use pgs_interface::profile::Inertia;
 use pgs_interface::record::collision;
 use pgs_interface::stripe::{Stripe, Stripes};
 
@@ -19,7 +19,7 @@ pub(crate) struct Layout {
     pub(crate) precision: Precision,
     pub(crate) inertia: Inertia,
     /// Collisions of an issue; padding completes the last issue. Where it is two, records are in
-    /// world coordinates and sixteen bits.
+    /// sixteen bits.
     pub(crate) together: usize,
     /// Beats of an issue on each stream: some on every stream of the design.
     pub(crate) share: PerStream,
@@ -48,22 +48,21 @@ impl Layout {
             return None;
         };
         let computed = (variant.inertia == Inertia::Isotropic || precision == Precision::F32)
-            && matches!(profile.flow, Flow::Passes)
             && config.subnormals == Subnormals::Keep
             && config.hazards == Hazards::Interlocked;
         let widths = profile.mm2s_widths;
-        let (format, geometry) = (numbers.collisions, profile.geometry);
+        let format = numbers.collisions;
         let together = profile.collisions_per_issue as usize;
-        let rows = together * variant.collision_rows();
+        let rows = together * collision::ROWS;
         let rows_per_beat = format.rows_per_beat();
         let beats = rows / rows_per_beat;
         let group = profile.stripes.collisions.streams.len();
         // Every issue begins at a beat and at a group.
         let alike = rows.is_multiple_of(rows_per_beat) && beats.is_multiple_of(group);
-        let as_it_is = (geometry, format) == (Geometry::Absolute, StreamFormat::F32);
+        let as_it_is = format == StreamFormat::F32;
         let known = match together {
-            1 => as_it_is || geometry == Geometry::Relative,
-            2 => (geometry, format) == (Geometry::Absolute, StreamFormat::Binary16),
+            1 => as_it_is,
+            2 => format == StreamFormat::Binary16,
             _ => false,
         };
         if !(computed && alike && known) {
@@ -124,34 +123,27 @@ fn warm_share(stripe: &Stripe, widths: &[u32], interval: u64) -> Option<PerStrea
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pgs_interface::profile::{FLOAT, HALF, MIXED, NAIVE, Profile, WINDOWED, WINDOWED16};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     fn layout(profile: &'static Profile) -> Option<Layout> {
         Layout::of(&BoardConfig { profile, ..BoardConfig::default() })
     }
 
     #[test]
-    fn collisions_of_float_are_taken_as_they_are_and_those_of_mixed_are_translated() {
+    fn collisions_of_float_are_taken_as_they_are() {
         let float = layout(&FLOAT).expect("it has short cuts");
         assert!(float.in_place);
         assert_eq!(float.bodies, Some(Turns { streams: 4 }));
         assert_eq!((float.share, float.warm_share), ([2, 2, 2, 1], Some([2; 4])));
-        let mixed = layout(&MIXED).expect("it has short cuts");
-        assert!(!mixed.in_place && mixed.warm_share.is_none());
-        assert_eq!(mixed.bodies, Some(Turns { streams: 3 }));
-        assert_eq!(mixed.share, [1, 1, 1, 0]);
-        assert_eq!(mixed.places[..3], [(0, 0), (1, 0), (2, 0)]);
     }
 
     #[test]
     fn world_inertia_takes_the_same_way_where_numbers_have_thirty_two_bits() {
-        for profile in [&FLOAT, &MIXED] {
-            let inertia = Inertia::World;
-            let config = BoardConfig { profile, inertia, ..BoardConfig::default() };
-            let layout = Layout::of(&config).expect("it has short cuts");
-            assert_eq!((layout.inertia, layout.velocity_rows), (inertia, 4));
-            assert!(layout.bodies.is_some());
-        }
+        let inertia = Inertia::World;
+        let config = BoardConfig { inertia, ..BoardConfig::default() };
+        let layout = Layout::of(&config).expect("it has short cuts");
+        assert_eq!((layout.inertia, layout.velocity_rows), (inertia, 4));
+        assert!(layout.bodies.is_some());
     }
 
     #[test]
@@ -170,18 +162,18 @@ mod tests {
         static APART: Profile = Profile {
             stripes: Stripes {
                 velocities: Stripe { streams: &[2], padded: false },
-                ..MIXED.stripes
+                ..FLOAT.stripes
             },
-            ..MIXED
+            ..FLOAT
         };
         static PADDED: Profile = Profile {
             stripes: Stripes {
                 results: Stripe { streams: &[0, 1, 2], padded: true },
-                ..MIXED.stripes
+                ..FLOAT.stripes
             },
-            ..MIXED
+            ..FLOAT
         };
-        static FEWER_OUT: Profile = Profile { s2mm_widths: &[128; 2], ..MIXED };
+        static FEWER_OUT: Profile = Profile { s2mm_widths: &[128; 2], ..FLOAT };
         for profile in [&APART, &PADDED, &FEWER_OUT] {
             let layout = layout(profile).expect("its collisions have short cuts");
             assert_eq!(layout.bodies, None, "{:?}", profile.stripes);
@@ -191,10 +183,8 @@ mod tests {
     /// Each condition on a design, one by one.
     #[test]
     fn others_go_the_long_way() {
-        for profile in [&NAIVE, &WINDOWED, &WINDOWED16] {
-            assert!(layout(profile).is_none(), "{}", profile.name);
-        }
-        let usual = BoardConfig { profile: &MIXED, ..BoardConfig::default() };
+        assert!(layout(&NAIVE).is_none());
+        let usual = BoardConfig::default();
         for config in [
             BoardConfig { inertia: Inertia::World, profile: &HALF, ..usual },
             BoardConfig { hazards: Hazards::Unchecked, ..usual },
@@ -207,8 +197,8 @@ mod tests {
             let collisions = Stripe { streams, padded: false };
             Profile { stripes: Stripes { collisions, ..of.stripes }, ..of }
         }
-        static ACROSS: Profile = striped(&[0, 1], MIXED);
-        static WITHOUT: Profile = striped(&[0, 1, 0], MIXED);
+        static ACROSS: Profile = striped(&[0, 1], FLOAT);
+        static WITHOUT: Profile = striped(&[0, 1, 0, 1, 0, 1, 0], FLOAT);
         // A step with impulses alone does, where these lie elsewhere or make a record too long.
         const fn warm(streams: &'static [u8], interval: u32) -> Profile {
             let stripe = Stripe { streams, padded: false };

@@ -29,8 +29,6 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
-use zynq_pgs::interface::profile::Window;
-
 use self::foreign::LOOKED_AT;
 use self::header::Header;
 
@@ -48,7 +46,7 @@ const HEADER_MAX: u32 = u16::MAX as u32;
 const ELEMENT_BYTES: usize = 4;
 
 /// Most rows of an array: no board takes more bodies or collisions.
-pub const ROWS_MAX: usize = Window::COLLISIONS_MAX as usize;
+pub const ROWS_MAX: usize = 1 << 20;
 
 /// An element type that a file can hold.
 pub trait Element: Copy {

@@ -1,13 +1,20 @@
 //! The targets: functions of bytes that panic when they find something.
 
+mod calls;
 mod chains;
 mod confinement;
+mod devices;
 mod faults;
+/// Bitstreams and overlays as the tests of loading make them.
+#[path = "../../../pgs/src/loading/tests/files.rs"]
+mod files;
 mod folders;
 mod layout;
+mod loads;
 mod packets;
 mod registers;
 mod scenes;
+mod served;
 mod space;
 
 use crate::tally::Tally;
@@ -68,6 +75,41 @@ pub const ALL: &[Target] = &[
                 without faults, or with an error that changed nothing, and the next one works",
         run: faults::run,
         longest: 320,
+    },
+    Target {
+        name: "requests",
+        about: "random requests to a served board: each gets the answer that the messages promise, \
+                a driver that breaks them loses the board, and the next one gets it",
+        run: served::requests,
+        longest: 512,
+    },
+    Target {
+        name: "answers",
+        about: "the driver on a served board whose answers are falsified: opening and steps end, with \
+                an error that changed nothing or with a result",
+        run: served::answers,
+        longest: 64,
+    },
+    Target {
+        name: "devices",
+        about: "damaged descriptions of devices, in sysfs and in the device tree: they are read or \
+                refused in words, and no region reaches behind its map",
+        run: devices::run,
+        longest: 256,
+    },
+    Target {
+        name: "loads",
+        about: "damaged bitstreams and overlays: they are refused in words as the caller's; files \
+                that are taken are for this chip and set the clock that the bitstream asks for",
+        run: loads::run,
+        longest: 256,
+    },
+    Target {
+        name: "calls",
+        about: "calls of the C interface with random sizes, strides and values: a refused call changes \
+                no byte, and no call a byte between the elements",
+        run: calls::run,
+        longest: 512,
     },
 ];
 

@@ -24,12 +24,12 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let step = step(&mut input);
     let mut machine = Machine::with_slots(config, 24);
     let variant = machine.host.variant();
-    let (told, mut lanes) = step.on(&variant);
-    told.write_arguments(&machine.host);
+    let mut lanes = step.packed(&variant);
+    step.write_arguments(&machine.host);
     let damaged = damage(&mut input, &machine.host, &mut lanes);
 
     let mut flight = Flight::default();
-    machine.arm(&mut flight, &result_beats(&variant, told.bodies.len()));
+    machine.arm(&mut flight, &result_beats(&variant, step.bodies.len()));
     machine.start();
     machine.send(&mut flight, &lanes);
     let ended = machine.wait(&flight, microseconds(if damaged { 60 } else { ENOUGH }));

@@ -33,7 +33,7 @@ const CHIPS: &[(&str, u32)] = &[
 
 /// A chip: its IDCODE without the revision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Chip(u32);
+pub struct Chip(u32);
 
 impl Chip {
     /// The chip of an IDCODE, whatever its revision.

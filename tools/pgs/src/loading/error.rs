@@ -11,7 +11,7 @@ use super::progress::Stage;
 
 /// The party at fault when loading fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AtFault {
+pub enum AtFault {
     /// The command line, or a file named on it.
     Caller,
     /// The kernel: its configuration, other programs, rights.
@@ -22,7 +22,9 @@ pub(crate) enum AtFault {
 
 /// Why loading was refused or failed.
 #[derive(Debug, Error)]
-pub(crate) enum LoadError {
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the message of each says it")]
+pub enum LoadError {
     #[error("cannot read {}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{}: expected a bitstream (.bit.bin), found {found}", path.display())]
@@ -141,7 +143,8 @@ impl LoadError {
     }
 
     /// The party at fault.
-    pub(crate) fn at_fault(&self) -> AtFault {
+    #[must_use]
+    pub fn at_fault(&self) -> AtFault {
         match self {
             Self::Unreadable { .. }
             | Self::Bitstream { .. }
@@ -163,7 +166,8 @@ impl LoadError {
     }
 
     /// The next step.
-    pub(crate) fn next(&self) -> String {
+    #[must_use]
+    pub fn next(&self) -> String {
         match self {
             Self::Unreadable { path, source } => unreadable(path, source),
             Self::Bitstream { next, .. } => next.clone(),

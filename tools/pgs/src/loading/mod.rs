@@ -13,6 +13,10 @@
 //!
 //! Source: linux-xlnx, `drivers/fpga/fpga-mgr.c` (attributes `flags`, `firmware`, `state`) and
 //! `drivers/of/configfs.c` (`overlays/<name>/{dtbo,status}`); mainline has neither.
+//!
+//! A library of its own, so that `tools/fuzz` can call it, too.
+
+#![forbid(unsafe_code)]
 
 mod bitstream;
 mod chip;
@@ -39,10 +43,10 @@ use bitstream_model::interface::usr_access;
 use zynq_pgs::platform::{UioListing, uio_listing};
 use zynq_pgs::{ManagerChoice, UioNode};
 
-pub(crate) use chip::Chip;
-pub(crate) use error::{AtFault, LoadError};
-pub(crate) use progress::{Progress, Stage};
-pub(crate) use system::{Linux, System};
+pub use chip::Chip;
+pub use error::{AtFault, LoadError};
+pub use progress::{Progress, Stage};
+pub use system::{Linux, System};
 
 use bitstream::Bitstream;
 use firmware::Firmware;
@@ -55,17 +59,21 @@ const OPERATING: &str = "operating";
 
 /// A bitstream to load.
 #[derive(Debug, Clone)]
-pub(crate) struct Request {
-    pub(crate) bitstream: PathBuf,
-    pub(crate) overlay: Option<PathBuf>,
-    pub(crate) partial: bool,
+pub struct Request {
+    /// Its file.
+    pub bitstream: PathBuf,
+    /// The file of the overlay to apply after it.
+    pub overlay: Option<PathBuf>,
+    /// Whether it is a partial one.
+    pub partial: bool,
     /// The chip that the bitstream must be for.
-    pub(crate) part: Chip,
+    pub part: Chip,
     /// Whether to load files that cannot be judged or are refused for their content.
-    pub(crate) unjudged: bool,
-    pub(crate) manager: ManagerChoice,
+    pub unjudged: bool,
+    /// The FPGA manager that loads it.
+    pub manager: ManagerChoice,
     /// Whether to load although overlays and drivers of others are bound to the logic.
-    pub(crate) replace_others: bool,
+    pub replace_others: bool,
 }
 
 impl Request {
@@ -81,48 +89,60 @@ impl Request {
 
 /// The facts that the files of a request tell.
 #[derive(Debug)]
-pub(crate) struct Judged {
+pub struct Judged {
     bytes: Vec<u8>,
-    pub(crate) chip: Option<Chip>,
+    /// The chip that the bitstream is for, if it tells.
+    pub chip: Option<Chip>,
     /// The rate of the PL clock 0 that the bitstream asks for, MHz.
-    pub(crate) wanted_mhz: Option<u32>,
+    pub wanted_mhz: Option<u32>,
     overlay: Option<(Overlay, Vec<u8>)>,
     doubt: Option<LoadError>,
 }
 
 impl Judged {
     /// The length of the bitstream.
-    pub(crate) fn bytes(&self) -> u64 {
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
         self.bytes.len() as u64
     }
 
     /// The rate that the overlay, if there is one, sets for the PL clock 0, Hz.
-    pub(crate) fn overlay_clock_hz(&self) -> Option<Option<u32>> {
+    #[must_use]
+    pub fn overlay_clock_hz(&self) -> Option<Option<u32>> {
         self.overlay.as_ref().map(|(overlay, _)| overlay.clock_hz)
     }
 }
 
 /// A loaded bitstream.
 #[derive(Debug)]
-pub(crate) struct Loaded {
-    pub(crate) judged: Judged,
+pub struct Loaded {
+    /// The files.
+    pub judged: Judged,
     /// The firmware name given to the manager, relative to the kernel's firmware folder.
-    pub(crate) firmware: String,
+    pub firmware: String,
     /// Whether the file was copied for loading; the copy is removed.
-    pub(crate) copied: bool,
-    pub(crate) manager: String,
-    pub(crate) manager_name: String,
-    pub(crate) state_before: String,
-    pub(crate) state: String,
-    pub(crate) time: Duration,
+    pub copied: bool,
+    /// The device of the FPGA manager, as `fpga0`.
+    pub manager: String,
+    /// The manager's name.
+    pub manager_name: String,
+    /// The manager's state before loading.
+    pub state_before: String,
+    /// Its state after loading.
+    pub state: String,
+    /// The time that the kernel took.
+    pub time: Duration,
     /// Name of the applied overlay.
-    pub(crate) overlay: Option<&'static str>,
+    pub overlay: Option<&'static str>,
     /// The UIO nodes of the logic, by number.
-    pub(crate) nodes: Vec<UioNode>,
+    pub nodes: Vec<UioNode>,
 }
 
 /// Judges the files of a request by their content, and refuses doubtful ones too.
-pub(crate) fn check(request: &Request) -> Result<Judged, LoadError> {
+///
+/// # Errors
+/// [`LoadError`], of the caller's files alone.
+pub fn check(request: &Request) -> Result<Judged, LoadError> {
     let mut judged = judge(request)?;
     judged.doubt.take().map_or(Ok(()), |doubt| request.unless_overridden(doubt))?;
     Ok(judged)
@@ -145,7 +165,10 @@ fn judge(request: &Request) -> Result<Judged, LoadError> {
 }
 
 /// Loads a bitstream, and applies an overlay if the request names one.
-pub(crate) fn load(
+///
+/// # Errors
+/// [`LoadError`].
+pub fn load(
     system: &dyn System,
     request: &Request,
     progress: &Progress,

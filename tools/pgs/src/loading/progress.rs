@@ -8,7 +8,7 @@ use super::LoadError;
 
 /// The state of the logic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Stage {
+pub enum Stage {
     /// Nothing was given to the kernel.
     #[default]
     Untouched,
@@ -36,7 +36,7 @@ impl State {
 
 /// How far loading has come; clones share it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Progress(Arc<Mutex<State>>);
+pub struct Progress(Arc<Mutex<State>>);
 
 impl Progress {
     fn state(&self) -> MutexGuard<'_, State> {
@@ -63,7 +63,7 @@ impl Progress {
 
     /// Removes the copy and ends the program. While `exit` runs, loading does not reach its next
     /// stage.
-    pub(crate) fn end(&self, exit: impl FnOnce(LoadError)) {
+    pub fn end(&self, exit: impl FnOnce(LoadError)) {
         let mut state = self.state();
         state.remove_copy();
         exit(LoadError::Interrupted { stage: state.stage });

@@ -7,15 +7,19 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 use nix::libc::O_NONBLOCK;
+use step_folder::replace::sync;
 
 use super::LoadError;
 
 /// The files of a Linux system.
-pub(crate) trait System: Debug {
+pub trait System: Debug {
     /// Resolves a path without its leading slash.
     fn path(&self, path: &str) -> PathBuf;
 
     /// Writes an existing attribute of the kernel in one piece.
+    ///
+    /// # Errors
+    /// The system's.
     fn write(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).truncate(true).open(path)?;
         // The kernel acts on each write: a second write would set another value.
@@ -30,19 +34,28 @@ pub(crate) trait System: Debug {
     }
 
     /// Makes a folder, which may create an object of the kernel.
+    ///
+    /// # Errors
+    /// The system's.
     fn make_directory(&self, path: &Path) -> io::Result<()> {
         fs::create_dir(path)
     }
 
     /// Removes such a folder; attributes of the kernel in it do not keep it.
+    ///
+    /// # Errors
+    /// The system's.
     fn remove_directory(&self, path: &Path) -> io::Result<()> {
         fs::remove_dir(path)
     }
 
     /// Writes a file at a path that does not exist yet.
+    ///
+    /// # Errors
+    /// The system's.
     fn create(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        file.write_all(bytes).and_then(|()| file.sync_all()).inspect_err(|_| {
+        file.write_all(bytes).and_then(|()| sync(&file)).inspect_err(|_| {
             // Half a file is worse than none; the first error is reported.
             let _ = fs::remove_file(path);
         })
@@ -51,8 +64,9 @@ pub(crate) trait System: Debug {
 
 /// This system, or the files of one below a folder.
 #[derive(Debug, Clone)]
-pub(crate) struct Linux {
-    pub(crate) root: PathBuf,
+pub struct Linux {
+    /// The folder.
+    pub root: PathBuf,
 }
 
 impl System for Linux {

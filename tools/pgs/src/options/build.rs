@@ -213,7 +213,7 @@ mod tests {
             of("half", |numbers| numbers.bodies = StreamFormat::Thesis16).find('('),
             Some(14)
         );
-        for text in ["float", "mixed,flush,world", "half,thesis16,f32", "half,f32,world"] {
+        for text in ["float", "naive,flush,world", "half,thesis16,f32", "half,f32,world"] {
             assert_eq!(described(&text.parse::<Build>().expect(text).config()), text);
         }
         let of_this_machine: Build = "float,threads=1,lanes=off".parse().expect("a build");

@@ -35,8 +35,7 @@ pub(crate) enum AskedOrder {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OrderName {
     /// Fewest cycles on the board: hazard-free-nearby (without empty entries if the pipeline waits
-    /// on hazards), or as-given if it takes fewer cycles; hazard-free if the chip keeps live bodies
-    /// only
+    /// on hazards), or as-given if it takes fewer cycles
     Auto,
     /// As detected, which is Bullet's order: many hazards
     AsGiven,
@@ -185,7 +184,7 @@ impl OrderingArgs {
 
 /// Whether the board's results equal a solution of one collision after the other, in any order.
 pub(crate) fn is_sequential(capabilities: &Capabilities) -> bool {
-    capabilities.interlocked && capabilities.window.is_none()
+    capabilities.interlocked
 }
 
 /// The name of an order.

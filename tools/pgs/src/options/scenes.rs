@@ -1,5 +1,7 @@
 //! The scene, as chosen on the command line.
 
+use std::hint::black_box;
+
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::Inertia as Form;
 use clap::{Args, ValueEnum};
@@ -73,7 +75,7 @@ fn drop_height(text: &str) -> Result<f32, String> {
 pub(crate) fn check_rows(grid: Grid) -> Result<(), Failure> {
     let bodies = u64::from(grid.cubes()) + 1;
     if bodies <= npy::ROWS_MAX as u64 {
-        return Ok(());
+        return check_memory(grid);
     }
     let error = format!(
         "a grid of {grid} is {bodies} bodies with the ground, no board takes more than {}",
@@ -86,13 +88,30 @@ pub(crate) fn check_rows(grid: Grid) -> Result<(), Failure> {
 pub(crate) fn check_size(grid: Grid, capabilities: &Capabilities) -> Result<(), Failure> {
     let capacity = capabilities.body_capacity;
     if grid.cubes() < capacity {
-        return Ok(());
+        return check_memory(grid);
     }
     let error = format!(
         "a grid of {grid} is {} bodies with the ground, the board takes at most {capacity}",
         u64::from(grid.cubes()) + 1
     );
     Err(Failure::input(error).next("give a smaller --grid"))
+}
+
+/// Memory that a run takes for each body, bytes: 98 MB for the 38,880 cubes of the default grid.
+const BODY_BYTES: usize = 2560;
+
+/// Refuses a grid that the system has no memory for. The program would abort at some later
+/// allocation.
+fn check_memory(grid: Grid) -> Result<(), Failure> {
+    let bytes = BODY_BYTES * grid.cubes() as usize;
+    let mut room = Vec::<u8>::new();
+    let reserved = room.try_reserve_exact(bytes);
+    // Otherwise a compiler may leave out an allocation that nothing uses.
+    black_box(&mut room);
+    reserved.map_err(|_| {
+        let error = format!("a grid of {grid} takes about {bytes} bytes of memory, there is less");
+        Failure::input(error).next("give a smaller --grid, free memory, or raise the limit of it")
+    })
 }
 
 impl SceneArgs {

@@ -67,7 +67,6 @@ pub(crate) fn reason(report: &StepReport) -> Option<String> {
     let OrderChoice::Cheapest(costs) = report.order_choice else {
         return match report.order_choice {
             OrderChoice::NoInterlock => Some("this board does not wait on hazards".to_owned()),
-            OrderChoice::LiveBodies => Some("this board keeps only live bodies on chip".to_owned()),
             _ => None,
         };
     };
@@ -92,14 +91,6 @@ pub(crate) fn text(report: &StepReport, permutation: Option<Permutation>) -> Str
         let share = report.empty as f64 / (report.collisions as f64).max(1.0);
         text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);
     }
-    if let Some(live) = &report.live {
-        text += &format!(
-            ", {} bodies alive and {} in places at most, longest span {} entries",
-            grouped(live.most_alive.into()),
-            grouped(live.most_held.into()),
-            grouped(live.longest_span.into()),
-        );
-    }
     if let Some(verified) = &report.verified {
         text += &format!(
             ", verified: {} hazards, {} bodies alive at most, longest span {} slots",
@@ -117,11 +108,6 @@ pub(crate) fn to_json(report: &StepReport) -> Value {
         "name": name(report.order),
         "choice": choice_json(&report.order_choice),
         "empty": report.empty,
-        "live": report.live.map(|live| json!({
-            "most_alive": live.most_alive,
-            "most_held": live.most_held,
-            "longest_span": live.longest_span,
-        })),
         "verified": report.verified.map(|verified| json!({
             "hazards": verified.hazards,
             "lost_updates": verified.lost_updates,
@@ -137,7 +123,6 @@ fn choice_json(choice: &OrderChoice) -> Value {
     let name = match choice {
         OrderChoice::Asked => "asked",
         OrderChoice::NoInterlock => "no_interlock",
-        OrderChoice::LiveBodies => "live_bodies",
         OrderChoice::Cheapest(_) => "cheapest",
         _ => "other",
     };

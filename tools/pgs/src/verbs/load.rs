@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::process;
 
 use clap::Args;
+use pgs_loading::{AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use serde_json::{Value, json};
 
 use crate::common::CommonArgs;
 use crate::failure::{Cause, Failure, INTERRUPTED, Verdict};
 use crate::interrupt;
-use crate::loading::{self, AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use crate::output::SCHEMA;
 use crate::output::milliseconds;
 
@@ -89,7 +89,7 @@ pub(crate) fn run(
         replace_others: args.replace_others,
     };
     if args.check {
-        let judged = loading::check(&request)?;
+        let judged = pgs_loading::check(&request)?;
         if common.json {
             writeln!(out, "{:#}", document(args, &judged))?;
         } else {
@@ -108,7 +108,7 @@ pub(crate) fn run(
             process::exit(INTERRUPTED.into());
         });
     });
-    let loaded = loading::load(&system, &request, &progress)?;
+    let loaded = pgs_loading::load(&system, &request, &progress)?;
     if common.json {
         let nodes: Vec<Value> = loaded
             .nodes

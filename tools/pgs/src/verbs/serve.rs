@@ -18,6 +18,7 @@ use crate::numbers::grouped;
 use crate::options::build::{BuildArgs, described};
 use crate::options::planned::PlannedArgs;
 use crate::output::SCHEMA;
+use crate::output::files::{Files, Named};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -77,11 +78,16 @@ pub(crate) fn run(
         let error = "a served board has memory of its own";
         return Err(Failure::input(error).next("leave out --memory; --memory-mib is its length"));
     }
+    Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.build.build().config() };
     let planned = args.planned.plan(&config, &StepParameters::default());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let bytes = args.memory_mib << 20;
+    if let Some(fence) = config.fence.filter(|fence| !fence.contains(MEMORY_BASE, bytes)) {
+        let error = format!("{bytes} bytes of memory at {MEMORY_BASE:#x} reach out of {fence}");
+        return Err(Failure::input(error).next("give a smaller --memory-mib, or another --fence"));
+    }
     let memory = MEMORY_BASE..MEMORY_BASE + bytes;
     let mut server =
         Server::bind(config, memory, &args.socket, accelerator).map_err(|error| match error {

@@ -1,10 +1,11 @@
 //! `pgs detect`: times of the detection, and Bullet's collisions beside ours.
 
 use std::fs;
+use std::process::Command;
 
 use serde_json::Value;
 
-use crate::common::{Ran, copy, golden, number, patch, run, text, variable, write};
+use crate::common::{Ran, copy, golden, number, patch, pgs, run, text, variable, write};
 
 /// Runs `pgs detect --input FOLDER OPTIONS`.
 fn detect(folder: &std::path::Path, options: &[&str]) -> Ran {
@@ -189,4 +190,16 @@ fn wrong_usage_is_refused() {
     let help = run(["detect", "--help"]);
     assert_eq!(help.code, Some(0));
     assert!(help.stdout.contains("pgs detect --input tests/golden/pile5_step60 --compare"));
+}
+
+/// Without the refusal the program aborts at the allocation that finds no memory.
+#[test]
+fn a_grid_that_finds_no_memory_ends_in_a_sentence() {
+    let command = pgs();
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "ulimit -v 500000; exec \"$0\" \"$@\""]);
+    shell.arg(command.get_program()).args(command.get_args());
+    let ran: Ran = shell.args(["detect", "--grid", "60x100x60"]).output().expect("a shell").into();
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(ran.stderr.contains("60x100x60 takes about 921600000 bytes"), "{}", ran.stderr);
 }

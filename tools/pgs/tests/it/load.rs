@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use std::io::Read as _;
+use std::io::{Read as _, Write as _};
 use std::os::unix::fs::FileTypeExt as _;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{Ran, Tied, pgs, run, signal, text};
 use crate::files_to_load::{bitstream as stream, overlay};
+use crate::filter::refuse;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -216,4 +217,34 @@ fn an_interrupted_load_removes_its_copy_and_tells_the_state_of_the_logic() {
             assert!(stderr.contains(text), "{sent}: {stderr}");
         }
     }
+}
+
+#[test]
+fn the_copy_of_a_bitstream_is_kept_where_fsync_is_refused_and_not_where_it_is_lost() {
+    use nix::libc;
+    use pgs_loading::{Linux, System as _};
+
+    let root = tempfile::tempdir().expect("a folder");
+    let linux = Linux { root: root.path().to_owned() };
+    let created = |name: &str, errno| {
+        pgs_support::in_forked_child(|| {
+            if refuse(&[libc::SYS_fsync, libc::SYS_fdatasync], errno).is_err() {
+                return 8;
+            }
+            u8::from(linux.create(&linux.path(name), b"a bitstream").is_ok())
+        })
+    };
+    let refused = [libc::EPERM, libc::ENOSYS, libc::EINVAL];
+    let kept = refused.map(|errno| created(&errno.to_string(), errno));
+    if kept == [Some(8); 3] {
+        let _ = writeln!(std::io::stderr(), "skipped: refused calls (no filter of system calls)");
+        return;
+    }
+    assert_eq!(kept, [Some(1); 3]);
+    for errno in refused {
+        let copy = fs::read(linux.path(&errno.to_string())).expect("a copy");
+        assert_eq!(copy, b"a bitstream");
+    }
+    assert_eq!(created("lost", libc::ENOSPC), Some(0));
+    assert!(!linux.path("lost").exists());
 }

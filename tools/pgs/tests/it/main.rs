@@ -7,6 +7,8 @@ mod common;
 #[path = "../../src/loading/tests/files.rs"]
 #[allow(dead_code, reason = "the tests of the parts use more of it")]
 mod files_to_load;
+#[path = "../../../folder/tests/filter/mod.rs"]
+mod filter;
 
 mod accelerator;
 mod arrays;

@@ -30,7 +30,7 @@ fn no_line_is_wider_than_a_terminal() {
     for options in [
         "--grid 5x5x5 --steps 40",
         "--grid 4x4x4 --steps 30 --profile half --format thesis16 --arithmetic f32 --hazards unchecked",
-        "--grid 4x4x4 --steps 30 --profile windowed16 --verify",
+        "--grid 4x4x4 --steps 30 --profile half --verify",
         "--grid 3x3x3 --steps 3 --scene shapes --inertia world --length-width 14 --retries 2",
         "--grid 3x3x3 --steps 9 --fault irq-drop,times=3",
     ] {
@@ -129,13 +129,6 @@ fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
     let deepest =
         |of: &Value| of["steps"][239]["deepest_penetration_m"].as_f64().expect("a number");
     assert!(deepest(&warm) < 0.5 * deepest(&cold), "{} m, {} m", deepest(&warm), deepest(&cold));
-    let refused = run("run --profile windowed --grid 2x2x2 --warm-start".split(' '));
-    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
-    assert!(
-        refused.stderr.contains("a warm start") && refused.stderr.contains("naive"),
-        "{}",
-        refused.stderr
-    );
 }
 
 #[test]
@@ -149,10 +142,10 @@ fn shapes_have_a_friction_for_each_pair_and_cubes_have_one() {
     assert!(refused.stderr.contains("--scene shapes"), "{}", refused.stderr);
 }
 
-/// Records of `mixed` have no room for a friction.
+/// Records of `half` have no room for a friction.
 #[test]
 fn shapes_take_their_frictions_from_the_table_where_collisions_have_none() {
-    let shapes = "--scene shapes --profile mixed --grid 3x3x3 --steps 60";
+    let shapes = "--scene shapes --profile half --grid 3x3x3 --steps 60";
     let (one, own) = (document(&format!("{shapes} --pair-friction=false")), document(shapes));
     assert_ne!(one["digest"], own["digest"]);
     let config = &own["config"];
@@ -181,15 +174,6 @@ fn shapes_are_stepped_warm_beside_the_same_ones_cold() {
     assert_eq!(alone["beside_cold"], Value::Null);
     let table = ran("--scene shapes --grid 2x2x2 --steps 3").stdout;
     assert!(table.contains("cold mm") && fact(&table, "cold").contains("one friction"), "{table}");
-}
-
-/// A design without a warm start steps the shapes cold, unless it is asked for one.
-#[test]
-fn shapes_are_cold_where_the_design_has_no_warm_start() {
-    let options = "--scene shapes --grid 2x2x2 --steps 2 --profile windowed";
-    assert_eq!(document(options)["config"]["warm_start"], false);
-    let refused = run(format!("run {options} --warm-start").split(' '));
-    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
 }
 
 #[test]

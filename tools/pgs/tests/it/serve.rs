@@ -282,3 +282,20 @@ fn ctrl_c_ends_a_step_that_stalls_and_a_second_driver_is_refused_meanwhile() {
     assert!(ended.stdout.contains(", 0 left engines running; "), "{}", ended.stdout);
     assert!(ended.stdout.contains(" 0 violations"), "{}", ended.stdout);
 }
+
+#[test]
+fn memory_behind_the_fence_and_a_socket_that_is_the_simulator_are_refused_by_the_server() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let socket = folder.path().join("board");
+    let refused = |more: &[&str], said: &[&str]| {
+        let ran = run(["serve", "--socket", common::text(&socket)].iter().chain(more));
+        assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+        assert!(said.iter().all(|said| ran.stderr.contains(said)), "{}", ran.stderr);
+    };
+    let fenced = ["--fence", "0x50000000+64M", "--memory-mib", "128"];
+    refused(&fenced, &["134217728 bytes", "0x50000000", "smaller --memory-mib"]);
+    assert!(!socket.exists());
+    std::fs::write(&socket, "a program").expect("written");
+    let simulator = format!("rtl:{}", socket.display());
+    refused(&["--accelerator", &simulator], &["--socket", "--accelerator", " are one file"]);
+}

@@ -42,6 +42,18 @@ pub enum Error {
         /// The folder.
         folder: PathBuf,
     },
+    /// Two files of a design are one, or one is the program's output.
+    #[error(
+        "{} and {} are one file: name another folder, or redirect the output elsewhere",
+        path.display(),
+        other.display()
+    )]
+    OneFile {
+        /// A file of the design.
+        path: PathBuf,
+        /// Another one, `/dev/stdout` or `/dev/stderr`.
+        other: PathBuf,
+    },
     /// A file, a program or a pipe.
     #[error("cannot {act}")]
     Io {

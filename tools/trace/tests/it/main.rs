@@ -5,7 +5,7 @@ mod events;
 mod schema;
 mod step;
 
-use bitstream_model::interface::profile::{FLOAT, HALF, WINDOWED};
+use bitstream_model::interface::profile::{FLOAT, HALF, NAIVE};
 use bitstream_model::recording::{Levels, Span};
 use bitstream_model::{BoardConfig, FaultKind};
 
@@ -65,7 +65,7 @@ fn a_recording_of_no_clocks_has_a_picture_of_numbers() {
 
 #[test]
 fn every_design_has_files() {
-    for profile in [&FLOAT, &HALF, &WINDOWED] {
+    for profile in [&FLOAT, &HALF, &NAIVE] {
         let taken = Taken::new(BoardConfig { profile, ..BoardConfig::default() });
         dump::assert_agrees(&taken);
         events::assert_agrees(&taken);

@@ -1,20 +1,16 @@
-//! Converts collisions of other designs to the batch's own format: f32, in world coordinates, on four
-//! streams. A portion fits into the cache.
-//!
-//! A record relative to body A becomes a record whose body A stands at the origin. Two records of
-//! three and a half beats share a beat: the sum of all their words, padding included, counts for the
+//! Converts collisions of `half` to the batch's own format: f32 on four streams. A portion fits into the
+//! cache. Two records of three and a half beats share a beat: the sum of all their words, padding included, counts for the
 //! first one.
 
 use super::records::{BEATS, STREAMS};
 use super::{Batch, Properties};
 use crate::accelerator::records::array::{Row, half_of};
-use crate::accelerator::records::decode::{self, Collision};
+use crate::accelerator::records::decode;
 use crate::accelerator::records::segment::PacketError;
 use crate::accelerator::records::striping::STREAMS_MAX;
-use crate::cast::register;
 use crate::shortcut::deferred::eligible::Layout;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::record::{Beat, LANES, WORD_LANE, collision, relative};
+use pgs_interface::record::{Beat, LANES, WORD_LANE, collision};
 use pgs_support::chunks::Chunks;
 use pgs_support::lanes::{Instructions, Work};
 
@@ -34,20 +30,6 @@ pub(crate) struct Translation {
     streams: [Box<[Beat]>; STREAMS],
     /// The sum of the words of each record as received.
     sums: Box<[u32]>,
-}
-
-/// The rows of a collision in world coordinates.
-#[inline(always)]
-fn rows(collision: &Collision) -> [Row; collision::ROWS] {
-    let row = |[x, y, z]: [f32; 3], word| [x.to_bits(), y.to_bits(), z.to_bits(), word];
-    let mut rows = [[0; 4]; collision::ROWS];
-    rows[collision::NORMAL] = row(collision.normal, register(collision.count));
-    rows[collision::BODY_A] = row(collision.position_a, collision.body_a);
-    rows[collision::BODY_B] = row(collision.position_b, collision.body_b);
-    for (row, contact) in rows[collision::CONTACTS..].iter_mut().zip(collision.contacts) {
-        *row = contact.map(f32::to_bits);
-    }
-    rows
 }
 
 impl Translation {
@@ -128,51 +110,10 @@ impl Work for Part<'_> {
 }
 
 impl Part<'_> {
+    /// Translates pairs of records with sixteen-bit words.
     #[inline(always)]
     fn translate(self) {
-        if self.layout.together == PAIR {
-            let format = self.layout.format;
-            self.translate_pairs(format);
-            return;
-        }
-        match self.layout.format {
-            StreamFormat::F32 => self.translate_of::<{ relative::ROWS }>(StreamFormat::F32),
-            StreamFormat::Binary16 => {
-                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Binary16);
-            }
-            // Words of both are read alike.
-            StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
-                self.translate_of::<{ relative::ROWS / 2 }>(StreamFormat::Thesis16);
-            }
-        }
-    }
-
-    /// Translates records of a format, each of `COUNT` beats.
-    #[inline(always)]
-    fn translate_of<const COUNT: usize>(self, format: StreamFormat) {
-        let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
-        let from: [_; COUNT] = std::array::from_fn(|beat| {
-            let (stream, number) = layout.places[beat];
-            let share = layout.share[stream];
-            (&streams[stream][first * share + number..], share)
-        });
-        const { assert!(BEATS[0] == 2 && BEATS[1] == 2 && BEATS[2] == 2 && BEATS[3] == 1) };
-        let pairs = a.split_arrays_mut::<2>().0.iter_mut().zip(b.split_arrays_mut::<2>().0);
-        let to = pairs.zip(c.split_arrays_mut::<2>().0.iter_mut().zip(d));
-        for (record, (sum, ((a, b), (c, d)))) in sums.iter_mut().zip(to).enumerate() {
-            let beats = from.map(|(beats, share)| beats[record * share]);
-            *sum = beats.iter().flat_map(|beat| beat.0).fold(0, u32::wrapping_add);
-            let rows = rows(&Collision::relative(format, &rows_in(&beats)));
-            let [a0, b0, c0, d0, a1, b1, c1] = rows.map(Beat);
-            (*a, *b, *c, *d) = ([a0, a1], [b0, b1], [c0, c1], d0);
-        }
-    }
-}
-
-impl Part<'_> {
-    /// Translates pairs of records in world coordinates with sixteen-bit words.
-    #[inline(always)]
-    fn translate_pairs(self, format: StreamFormat) {
+        let format = self.layout.format;
         let Self { layout, streams, first, to: [a, b, c, d], sums } = self;
         let from: [_; collision::ROWS] = std::array::from_fn(|beat| {
             let (stream, number) = layout.places[beat];
@@ -196,7 +137,7 @@ impl Part<'_> {
     }
 }
 
-/// The rows of two records in world coordinates, which share their beats.
+/// The rows of two records, which share their beats.
 #[inline(always)]
 fn rows_of_pair(
     format: StreamFormat,
@@ -214,23 +155,6 @@ fn rows_of_pair(
         for row in [collision::NORMAL, collision::BODY_A, collision::BODY_B] {
             let row = record * collision::ROWS + row;
             rows[row][WORD_LANE] = half_of(beats[row / 2], row % 2)[WORD_LANE];
-        }
-    }
-    rows
-}
-
-/// The rows in the beats of a record: of 32-bit words, or two in each of sixteen-bit words.
-#[inline(always)]
-fn rows_in<const COUNT: usize>(beats: &[Beat; COUNT]) -> [Row; relative::ROWS] {
-    let mut rows = [[0; LANES]; relative::ROWS];
-    if COUNT == relative::ROWS {
-        for (row, beat) in rows.iter_mut().zip(beats) {
-            *row = beat.0;
-        }
-    } else {
-        let words: &[u16] = bytemuck::cast_slice(beats);
-        for (to, word) in rows.as_flattened_mut().iter_mut().zip(words) {
-            *to = u32::from(*word);
         }
     }
     rows

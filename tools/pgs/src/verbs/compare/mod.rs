@@ -32,7 +32,7 @@ Examples:
   pgs compare float,gpu float,as-given --input tests/golden/pile5_step60
   pgs compare float half --input tests/golden/pile5_step60
   pgs compare half,thesis16 half,binary16 --steps 300 --every 10 --json
-  pgs compare float,world mixed,world --scene shapes --grid 8x8x8
+  pgs compare float,world naive,world --scene shapes --grid 8x8x8
 
 Examples with the Verilog in simulation (docs/bitstream.md):
   pgs compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator rtl:rtl-sim/pgs-rtl

@@ -55,7 +55,7 @@ mod tests {
             "float",
             "half,thesis16,f32,unchecked",
             "float,unchecked,hazard-free",
-            "mixed,body-by-body-oldest",
+            "naive,body-by-body-oldest",
             "float,auto",
         ] {
             assert_eq!(text.parse::<SideSpec>().expect(text).to_string(), text);

@@ -277,10 +277,6 @@ fn in_accelerator(kind: FaultKind, bench: &Bench) -> Vec<Cell> {
             phases.push(phase);
         }
     }
-    if bench.streams_once() {
-        // The fault acts in all phases at once.
-        return vec![Cell::new(Fault::new(kind), false)];
-    }
     phases
         .into_iter()
         .map(|phase| {

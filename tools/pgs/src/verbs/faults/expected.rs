@@ -73,8 +73,6 @@ fn name(code: ErrorCode) -> &'static str {
         ErrorCode::SelfCollision => "accelerator-self-collision",
         ErrorCode::Argument => "accelerator-argument",
         ErrorCode::PartialBeat => "accelerator-partial-beat",
-        ErrorCode::EmptyPlace => "accelerator-empty-place",
-        ErrorCode::Deadlock => "accelerator-deadlock",
         _ => "accelerator-unknown",
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::profile::{Flow, Profile};
+use bitstream_model::interface::profile::Profile;
 use bitstream_model::{
     BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount, Subnormals,
 };
@@ -243,10 +243,6 @@ impl Bench {
         let of = |count: u32| count + u32::from(warm_start && count > 0);
         [contact_iterations, friction_iterations].map(of)
     }
-
-    pub(super) fn streams_once(&self) -> bool {
-        matches!(self.config.profile.flow, Flow::Window(_))
-    }
 }
 
 /// Tries a cell.
@@ -341,11 +337,7 @@ fn locates_fault(cell: &Cell, error: &Error) -> bool {
     let state = states.and_then(|states| {
         states.iter().find(|s| s.channel.core == core && same_way(s.channel.direction))
     });
-    let at_phase = |state: &zynq_pgs::ChannelState| {
-        let once = state.phase == zynq_pgs::Phase::Collisions;
-        let phase = if once { "contact1".to_owned() } else { state.phase.name() };
-        phase == cell.phase_text()
-    };
+    let at_phase = |state: &zynq_pgs::ChannelState| state.phase.name() == cell.phase_text();
     match cell.kind {
         FaultKind::Stall => state.is_some_and(|state| state.bytes_moved < state.bytes_expected),
         FaultKind::DmaIntErr

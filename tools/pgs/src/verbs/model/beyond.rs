@@ -2,8 +2,8 @@
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::FLOAT_DESIGN;
-use bitstream_model::estimate::{MemoryUse, PortAccount, Records, StepTime};
-use bitstream_model::interface::profile::{FLOAT, MIXED, Variant};
+use bitstream_model::estimate::{MIXED, MemoryUse, PortAccount, Records, StepTime};
+use bitstream_model::interface::profile::{FLOAT, Variant};
 
 use super::ports::PUMP;
 use super::scene::{Scene, mib};

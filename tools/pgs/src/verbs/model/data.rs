@@ -1,7 +1,7 @@
 //! Tables 4.1 to 4.6: words in and out, before and after each reduction.
 
 use bitstream_model::estimate::thesis::data::{DataTable, TABLES};
-use bitstream_model::estimate::{Records, StepTraffic};
+use bitstream_model::estimate::{Records, StepTraffic, words};
 
 use super::scene::{Scene, mib, printed_mib};
 use super::table::{Cell, Kind, Table, text};
@@ -93,7 +93,7 @@ fn streamed(scene: &Scene) -> Table {
     );
     let (input, output) = (TABLES[4].rows[1].printed.words, TABLES[5].rows[1].printed.words);
     for variant in &scene.variants {
-        let words = variant.words();
+        let words = words(variant);
         let traffic = StepTraffic::new(variant, Records::Streamed, &scene.step);
         let arrays = [traffic.velocities, traffic.collisions, traffic.poses];
         let bytes = arrays.iter().fold(0_u64, |sum, array| sum.saturating_add(array.bytes));

@@ -19,9 +19,8 @@ mod window;
 use std::io::Write;
 
 use bitstream_model::Bandwidth;
-use bitstream_model::estimate::{StepShape, thesis};
-use bitstream_model::interface::extension::Extensions;
-use bitstream_model::interface::profile::{Inertia, MIXED, PROFILES, Profile, Variant};
+use bitstream_model::estimate::{DESIGNS, MIXED, StepShape, Window, thesis};
+use bitstream_model::interface::profile::{Inertia, Profile, Variant};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -122,7 +121,7 @@ impl Section {
 }
 
 fn names() -> PossibleValuesParser {
-    PROFILES.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
+    DESIGNS.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
 }
 
 const BANDWIDTHS: [Bandwidth; 4] = [
@@ -142,7 +141,7 @@ impl ModelArgs {
         let variant = |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() };
         Scene {
             step: StepShape::new(bodies, collisions),
-            variants: PROFILES.iter().filter(asked).map(variant).collect(),
+            variants: DESIGNS.iter().filter(asked).map(variant).collect(),
             bandwidths: self.bandwidth.map_or_else(|| BANDWIDTHS.to_vec(), |one| vec![one]),
         }
     }
@@ -158,10 +157,10 @@ impl ModelArgs {
             return Err(Failure::input(message).next("ask for --profile mixed, or for all"));
         }
         let windowed = |profile: &&'static Profile| {
-            window::has_window(&profile.flow) && [ALL, profile.name].contains(&&*self.profile)
+            Window::of(profile).is_some() && [ALL, profile.name].contains(&&*self.profile)
         };
         if self.section.contains(&Section::Windowed)
-            && !PROFILES.iter().copied().any(|profile| windowed(&profile))
+            && !DESIGNS.iter().copied().any(|profile| windowed(&profile))
         {
             let message =
                 format!("the section windowed has nothing about profile {}", self.profile);
@@ -169,11 +168,11 @@ impl ModelArgs {
                 .next("ask for --profile windowed or windowed16, or for all"));
         }
         let starts_warm = |profile: &&'static Profile| {
-            Extensions::possible(&profile.default_variant()).warm_start
+            profile.stripes.warm_collisions.is_some()
                 && [ALL, profile.name].contains(&&*self.profile)
         };
         if self.section.contains(&Section::Warm)
-            && !PROFILES.iter().copied().any(|profile| starts_warm(&profile))
+            && !DESIGNS.iter().copied().any(|profile| starts_warm(&profile))
         {
             let message = format!("the section warm has nothing about profile {}", self.profile);
             return Err(Failure::input(message)
@@ -196,7 +195,7 @@ impl ModelArgs {
 pub(crate) fn thesis_tables() -> Vec<Table> {
     let scene = Scene {
         step: thesis::step(),
-        variants: PROFILES.iter().map(|profile| profile.default_variant()).collect(),
+        variants: DESIGNS.iter().map(|profile| profile.default_variant()).collect(),
         bandwidths: BANDWIDTHS.to_vec(),
     };
     Section::value_variants().iter().flat_map(|section| section.tables(&scene)).collect()

@@ -2,12 +2,11 @@
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::thesis::recorded::{Design, MEMORY_BANDWIDTH};
-use bitstream_model::estimate::{MemoryUse, Records, StepCycles, StepTime};
+use bitstream_model::estimate::{MemoryUse, Records, StepCycles, StepTime, Window};
 use bitstream_model::interface::profile::{Inertia, Variant};
 
 use super::scene::{Scene, difference, mib, yes_or_no};
 use super::table::{Cell, Kind, Table, text};
-use super::window::has_window;
 use crate::options::bandwidth::bandwidth_text;
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
@@ -58,7 +57,7 @@ fn cycles(scene: &Scene) -> Table {
          and results out, + its fill, from the last body in to the end of the step. A step that stalls on hazards takes longer.",
         scene.step.passes()
     ));
-    if scene.variants.iter().any(|variant| has_window(&variant.profile.flow)) {
+    if scene.variants.iter().any(|variant| Window::of(variant.profile).is_some()) {
         table.note(
             "Where the collisions stream once, all passes run in parallel: \"one pass\" has the cycles of all \
              passes, and \"fill\" is the lag of the last pass behind the first. Load and integration run in \

@@ -2,27 +2,19 @@
 
 use bitstream_model::Bandwidth;
 use bitstream_model::estimate::{
-    MemoryUse, Records, StepTime, StepTraffic, WindowCycles, WindowLogic, WindowStep,
+    MemoryUse, Records, StepTime, StepTraffic, Window, WindowCycles, WindowLogic, WindowStep,
 };
-use bitstream_model::interface::profile::{FLOAT, Flow, Variant, Window};
+use bitstream_model::interface::profile::{FLOAT, Variant};
 
 use super::scene::{Scene, mib, yes_or_no};
 use super::table::{Cell, Kind, Table, text};
-
-/// Whether a profile streams the collisions once.
-pub(super) fn has_window(flow: &Flow) -> bool {
-    matches!(flow, Flow::Window(_))
-}
 
 /// The tables, if one of these designs is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let designs: Vec<(&Variant, &Window)> = scene
         .variants
         .iter()
-        .filter_map(|variant| match &variant.profile.flow {
-            Flow::Window(design) => Some((variant, design)),
-            Flow::Passes => None,
-        })
+        .filter_map(|variant| Some((variant, Window::of(variant.profile)?)))
         .collect();
     if designs.is_empty() {
         return Vec::new();

@@ -27,6 +27,8 @@ mod text;
 mod write;
 
 use std::io::Write;
+#[cfg(feature = "report")]
+use std::path::Path;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -36,6 +38,8 @@ use crate::common::CommonArgs;
 use crate::failure::{Failure, Verdict};
 #[cfg(feature = "report")]
 use crate::interrupt::Interrupt;
+#[cfg(feature = "report")]
+use crate::output::files::Files;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -86,6 +90,8 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
+    let read = args.input.as_deref().unwrap_or(Path::new(""));
+    Files::of(common).write(write::named(&args.out)).read_folder(read, |_| false).check()?;
     write::check(&args.out)?;
     let interrupt = Interrupt::install();
     let report = match parts::gather(args, common, &interrupt) {
@@ -153,6 +159,24 @@ mod tests {
         }
         let failure = failure(&folder.path().join("new"), "--board uio");
         assert!(failure.chain().contains("the emulated board"), "{}", failure.chain());
+    }
+
+    /// The arrays of `--input` are read while the report is written.
+    #[test]
+    fn a_file_of_the_report_that_is_an_input_is_refused_before_anything_is_measured() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [input, out] = ["input", "out"].map(|name| folder.path().join(name));
+        std::fs::create_dir_all(out.join("figures")).expect("a folder");
+        std::fs::create_dir(&input).expect("a folder");
+        std::fs::write(input.join("a.npy"), "read").expect("written");
+        let options = format!("--board uio --input {}", input.display());
+        for file in ["report.json", "figures/figure.svg"] {
+            std::fs::hard_link(input.join("a.npy"), out.join(file)).expect("a link");
+            let said = failure(&out, &options).chain();
+            assert!(said.contains(file) && said.contains(" are one file"), "{said}");
+            std::fs::remove_file(out.join(file)).expect("removed");
+        }
+        assert!(failure(&out, &options).chain().contains("the emulated board"));
     }
 
     #[test]

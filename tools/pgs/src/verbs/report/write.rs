@@ -1,5 +1,6 @@
 //! Writes the files of the report: all of them, or none.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,12 +10,21 @@ use step_folder::replace::{ReplaceError, Replacement};
 use super::parts::Report;
 use super::{page, text};
 use crate::failure::{Cause, Failure};
-use crate::output::files;
+use crate::output::files::{self, Named};
 
 /// The files beside the figures.
 const FILES: [&str; 3] = ["report.html", "report.md", "report.json"];
 /// The folder of the figures.
 const FIGURES: &str = "figures";
+
+/// The files that the report may replace.
+pub(super) fn named(folder: &Path) -> impl Iterator<Item = Named> {
+    let figures = fs::read_dir(folder.join(FIGURES)).into_iter().flatten().flatten();
+    let figures = figures.map(|entry| entry.path());
+    let figures = figures.filter(|path| path.extension() == Some(OsStr::new("svg")));
+    let files = FILES.map(|file| folder.join(file)).into_iter().chain(figures);
+    files.map(|path| Named::option("out", path))
+}
 
 /// Makes the folder of the report, and sees that files can be written into it.
 pub(super) fn check(folder: &Path) -> Result<(), Failure> {

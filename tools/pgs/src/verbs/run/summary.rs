@@ -346,7 +346,7 @@ impl<'a> Summary<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zynq_pgs::interface::profile::{FLOAT, HALF, MIXED};
+    use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE};
 
     /// 254,000 cycles a pass at 275 MHz are 0.9236 ms; 190,500 at 250 MHz are 0.762 ms.
     #[test]
@@ -355,7 +355,7 @@ mod tests {
         assert!((ms(&FLOAT, 8) - 7.49).abs() < 1e-9);
         assert!((ms(&FLOAT, 20) - (7.49 + 12.0 * 0.923_636)).abs() < 1e-3);
         assert!((ms(&HALF, 9) - (6.23 + 0.762)).abs() < 1e-3);
-        assert!((ms(&MIXED, 8) - 7.49).abs() < 1e-9, "it has no design of its own there");
+        assert!((ms(&NAIVE, 8) - 7.49).abs() < 1e-9, "it has no design of its own there");
         let text = Thesis::for_run(&FLOAT, 8).text(8);
         let times = "float design 7.49 ms, GTX 980 13.64 ms, i7-3770 53.01 ms, for 127,000";
         let passes = "and 8 passes (inferred from its cycles, not printed)";

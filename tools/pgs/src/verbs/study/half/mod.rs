@@ -26,13 +26,12 @@ const EXAMPLES: &str = "\
 Examples:
   pgs study half --input tests/golden/pile5_step60
   pgs study half --drop 5 --steps 240
-  pgs study half --grid 10x10x10 --build half --build half,f32 --build mixed --json
+  pgs study half --grid 10x10x10 --build half --build half,f32 --json
 
 The boards start from one state. float is the original; every other build takes the same steps by
 itself, with the collisions as given, and is compared with float as eq. 4.1 of the thesis does.
 Builds are written as for `pgs compare`: half has binary16 throughout; thesis16 is the thesis' own
-sixteen bits, and thesis16-literal its encoder taken literally; mixed, the cure, has collisions of 16
-bits relative to body A and poses in f32. Unmoved is the share of position components
+sixteen bits, and thesis16-literal its encoder taken literally. Unmoved is the share of position components
 whose bits, as sent to the board, a step did not change. Energies are kinetic.
 
 The splits are of the sixteen bits of a number into exponent and mantissa (thesis §4.6.4), on the
@@ -40,7 +39,7 @@ numbers that the step after the last one of float gives the board, or on the fol
 exponent is that of the largest number; bits are cut off as in the thesis' format, and numbers below
 the range become the smallest one. No board is built with them.";
 
-/// Sixteen bits beside float (thesis §4.6, Figure 4.10), and their cure
+/// Sixteen bits beside float (thesis §4.6, Figure 4.10)
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Options {
@@ -52,7 +51,7 @@ pub(crate) struct Options {
 }
 
 /// The builds beside float, unless others are given.
-const DEFAULTS: [&str; 4] = ["half", "half,thesis16", "half,thesis16-literal", "mixed"];
+const DEFAULTS: [&str; 3] = ["half", "half,thesis16", "half,thesis16-literal"];
 
 /// The build that the others are compared with.
 const ORIGINAL: &str = "float";

@@ -1,0 +1,3 @@
+//! The target `answers` for libFuzzer.
+#![no_main]
+include!("run.rs");

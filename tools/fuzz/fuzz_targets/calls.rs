@@ -1,0 +1,3 @@
+//! The target `calls` for libFuzzer.
+#![no_main]
+include!("run.rs");

@@ -1,0 +1,3 @@
+//! The target `devices` for libFuzzer.
+#![no_main]
+include!("run.rs");

@@ -1,0 +1,3 @@
+//! The target `loads` for libFuzzer.
+#![no_main]
+include!("run.rs");

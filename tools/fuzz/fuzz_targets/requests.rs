@@ -1,0 +1,3 @@
+//! The target `requests` for libFuzzer.
+#![no_main]
+include!("run.rs");
