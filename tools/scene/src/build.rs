@@ -3,7 +3,7 @@
 use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-use crate::detect::{self, BroadPhase, DetectionTimes, Detector, Geometries};
+use crate::detect::{self, DetectionTimes, Detector, Geometries};
 use crate::{CUBE_HALF_EXTENT, GROUND, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
@@ -59,7 +59,10 @@ impl Default for SceneOptions {
 ///
 /// Body 0 is the ground: a static box whose top is the plane y = 0. The other bodies follow in the
 /// order of x, then y, then z, with z the fastest.
-#[derive(Debug)]
+///
+/// Detection keeps contacts of bodies that hardly move against each other, so that the collisions
+/// depend a little on earlier poses. A clone goes on as the scene itself would.
+#[derive(Debug, Clone)]
 pub struct Scene {
     shapes: Vec<Shape>,
     /// The geometry of each shape; none for the ground.
@@ -155,6 +158,7 @@ impl Scene {
     }
 
     /// Sets the number of threads for detection, the caller's included; no result depends on it.
+    /// The next detection starts from nothing.
     /// The default is the machine's number, up to eight.
     pub fn set_threads(&mut self, threads: usize) {
         self.detector.set_threads(threads.max(1));
@@ -183,11 +187,6 @@ impl Scene {
         collisions
     }
 
-    /// Chooses the broad phase of later detections; no result depends on it.
-    pub fn set_broad_phase(&mut self, broad_phase: BroadPhase) {
-        self.detector.set_broad_phase(broad_phase);
-    }
-
     /// The times of the last [`detect`](Self::detect).
     #[must_use]
     pub fn detection_times(&self) -> DetectionTimes {
@@ -202,21 +201,21 @@ impl Scene {
     }
 
     /// All contact points of two bodies, on the surface of `b`: [`detect`](Self::detect) chooses
-    /// up to four of them; with the ground the chosen ones. `None` if the narrow phase never asks for this pair:
-    /// the ground, body 0, can only be `a`.
+    /// up to four of them; with the ground the chosen ones. `None` if the narrow phase never asks
+    /// for this pair: the ground, body 0, can only be `a`.
     #[must_use]
     pub fn all_points(&self, a: u32, b: u32) -> Option<Vec<Contact>> {
         standard(|| detect::all_points(&self.bodies, Geometries(&self.geometries), a, b))
     }
 
-    /// Gives each collision a friction of its own from now on: the geometric mean of the frictions of
-    /// both shapes, one for each of [`shapes`](Self::shapes).
+    /// Gives each collision a friction of its own from now on: the geometric mean of the frictions
+    /// of both shapes, one for each of [`shapes`](Self::shapes).
     pub fn set_frictions(&mut self, frictions: &[f32]) {
         self.frictions = frictions.to_vec();
     }
 
-    /// Gives each shape the root of its friction, so that the product of two is their geometric mean. For
-    /// boards that take frictions from the table of shapes.
+    /// Gives each shape the root of its friction, so that the product of two is their geometric
+    /// mean. For boards that take frictions from the table of shapes.
     pub fn set_shape_frictions(&mut self, frictions: &[f32]) {
         for (shape, friction) in self.shapes.iter_mut().zip(frictions) {
             *shape = shape.with_friction(standard(|| friction.sqrt()));

@@ -8,7 +8,8 @@ use zynq_pgs::{Pose, ShapeError};
 pub enum SceneError {
     /// The text is not a grid.
     #[error(
-        "expected a grid as three numbers of cubes joined by \"x\", such as 36x30x36, found {found:?}"
+        "expected a grid as three numbers of cubes joined by \"x\", such as 36x30x36, \
+         found {found:?}"
     )]
     GridSyntax {
         /// The text.
@@ -36,12 +37,12 @@ pub enum SceneError {
     },
     /// Body 0 is not the ground.
     #[error(
-        "expected body 0 to be the ground, with its centre at [0.0, {:?}, 0.0] and the orientation [0.0, 0.0, 0.0, 1.0], \
-         found {}",
+        "expected body 0 to be the ground, with its centre at [0.0, {:?}, 0.0] and the orientation \
+         [0.0, 0.0, 0.0, 1.0], found {}",
         -crate::GROUND_HALF_EXTENT,
         found.map_or_else(
             || "no bodies".to_owned(),
-            |Pose { position, orientation }| format!("a body at {position:?}, turned by {orientation:?}")
+            |pose| format!("a body at {:?}, turned by {:?}", pose.position, pose.orientation)
         )
     )]
     Ground {

@@ -1,8 +1,8 @@
 //! Poses between two steps, for pictures at another rate than the steps.
 //!
-//! Source: thesis, section 2.1.1; Glenn Fiedler: "Fix your timestep!" (2004). Every step has the same
-//! length. The time of a picture that no step has used yet remains for the next one, and the picture
-//! shows the bodies that far on the way from the last step but one to the last.
+//! Source: thesis, section 2.1.1; Glenn Fiedler: "Fix your timestep!" (2004). Every step has the
+//! same length. The time of a picture that no step has used yet remains for the next one, and the
+//! picture shows the bodies that far on the way from the last step but one to the last.
 
 use std::time::Duration;
 

@@ -42,7 +42,7 @@ mod shapes;
 mod spheres;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
-pub use detect::{BroadPhase, DetectionTimes, MARGIN};
+pub use detect::{DetectionTimes, MARGIN};
 pub use error::SceneError;
 pub use frames::{StepClock, interpolate};
 pub use geometry::Geometry;

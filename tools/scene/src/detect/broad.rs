@@ -24,16 +24,6 @@ const _: () = assert!(GAP + SKIN <= GAP_MAX, "candidates are in neighbouring cel
 /// Smallest number of bodies for which a further thread speeds up the search.
 const SEARCHED_PER_THREAD: usize = 2048;
 
-/// The way in which pairs of bodies that may touch are found. Both ways find the same pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum BroadPhase {
-    /// A grid of cells.
-    #[default]
-    Grid,
-    /// Sweep and prune, as the thesis describes it (section 2.2.1), on the calling thread alone.
-    Sweep,
-}
-
 /// The range of the bodies' movement and growth, along each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Drift {
@@ -90,7 +80,7 @@ impl Drift {
 }
 
 /// The broad phase.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct Broad {
     /// The bounds at the time of the search.
     searched: Vec<Bounds>,
@@ -117,22 +107,19 @@ impl Broad {
         &self.searched
     }
 
-    /// Candidates, which include all pairs of boxes at most [`GAP`] apart; lower index first,
-    /// sorted. `drift` is the bodies' movement since [the search](Self::searched_bounds).
-    pub(super) fn candidates(
-        &mut self,
-        bounds: &[Bounds],
-        drift: &Drift,
-        crew: &mut Crew,
-    ) -> &[(u32, u32)] {
-        if !drift.keeps_candidates() {
+    /// Searches for candidates if any two bodies may have come too near; returns whether it did.
+    /// `drift` is the bodies' movement since [the search](Self::searched_bounds).
+    pub(super) fn update(&mut self, bounds: &[Bounds], drift: &Drift, crew: &mut Crew) -> bool {
+        let anew = !drift.keeps_candidates();
+        if anew {
             self.search(bounds, crew);
         }
-        &self.candidates
+        anew
     }
 
-    /// The candidates of the last search.
-    pub(super) fn kept(&self) -> &[(u32, u32)] {
+    /// Candidates, which include all pairs of boxes at most [`GAP`] apart; lower index first,
+    /// sorted.
+    pub(super) fn candidates(&self) -> &[(u32, u32)] {
         &self.candidates
     }
 
@@ -217,7 +204,6 @@ fn sort_few(pairs: &mut [(u32, u32)]) {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::sweep::Sweep;
     use super::*;
 
     /// A change of a body from one step to the next.
@@ -255,7 +241,8 @@ mod tests {
             for (before, now) in self.broad.searched_bounds(bounds.len()).iter().zip(bounds) {
                 drift.add(before, now);
             }
-            near(bounds, self.broad.candidates(bounds, &drift, &mut self.crew))
+            self.broad.update(bounds, &drift, &mut self.crew);
+            near(bounds, self.broad.candidates())
         }
     }
 
@@ -286,7 +273,7 @@ mod tests {
         ) {
             let mut bounds = vec![Bounds::NONE];
             bounds.extend(bodies.into_iter().map(|(centre, reach)| Bounds { centre, reach }));
-            let (mut kept, mut sweep) = (Kept::default(), Sweep::default());
+            let mut kept = Kept::default();
             for (fall, events) in steps {
                 for body in &mut bounds {
                     body.centre = std::array::from_fn(|axis| body.centre[axis] + fall[axis]);
@@ -313,8 +300,7 @@ mod tests {
                     }
                 }
                 let expected = every_pair(&bounds);
-                prop_assert_eq!(kept.pairs(&bounds), &*expected);
-                prop_assert_eq!(near(&bounds, sweep.candidates(&bounds)), expected);
+                prop_assert_eq!(kept.pairs(&bounds), expected);
             }
         }
     }

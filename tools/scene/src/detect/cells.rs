@@ -41,7 +41,7 @@ struct Entry {
 }
 
 /// Bodies sorted by their cells.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct Cells {
     /// The cell of each body.
     numbers: Vec<u64>,

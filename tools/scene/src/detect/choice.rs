@@ -4,8 +4,8 @@ use zynq_pgs::{Body, Contact};
 
 use super::Geometries;
 use super::ground;
-use super::parry::Parry;
-use crate::{GROUND, rotation};
+use super::parry::{Parry, Place, pose};
+use crate::GROUND;
 
 /// The contact points of bodies `a` and `b` before four of them are chosen, on the surface of `b`.
 /// None if a body is missing or is no obstacle; body 0 is the ground, which can only be `a`.
@@ -22,14 +22,14 @@ pub(crate) fn all_points(
         let used = |found: zynq_pgs::Collision| found.contacts[..found.count as usize].to_vec();
         return Some(found.map(used).unwrap_or_default());
     }
+    let b_in_a = pose(body_a).inv_mul(&pose(body_b));
     let mut parry = Parry::default();
-    let (_, places) = parry.ask([body_a, body_b], [geometries.of(body_a)?, geometry_b])?;
-    let rows = rotation::matrix(body_b.pose.orientation);
-    let in_world = |point| rotation::placed(body_b.pose.position, &rows, point);
-    let contacts = places
-        .iter()
-        .map(|place| Contact { point: in_world(place.on_b), distance: place.distance });
-    Some(contacts.collect())
+    let (_, places) = parry.ask(&b_in_a, [geometries.of(body_a)?, geometry_b])?;
+    let in_world = |place: &Place| Contact {
+        point: (pose(body_b) * place.on_b).to_array(),
+        distance: place.distance,
+    };
+    Some(places.iter().map(in_world).collect())
 }
 
 #[cfg(test)]

@@ -1,5 +1,4 @@
-//! Asks parry3d for the contacts of pairs that are not both boxes, and of boxes that the lanes
-//! leave to it.
+//! Asks parry3d for the contacts of a pair.
 //!
 //! parry computes the contact manifold in the frame of its first shape, which is our body A. Its
 //! normal points from A to B, ours from B to A; its distances mean the same.
@@ -8,10 +7,9 @@ use parry3d::math::{Pose, Rotation, Vector};
 use parry3d::query::details::contact_manifold_cuboid_cuboid;
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, PackedFeatureId, Shape};
-use zynq_pgs::Body;
+use zynq_pgs::{Body, Contact};
 
 use super::MARGIN;
-use super::points::MOST;
 use crate::{Geometry, hull};
 
 /// Squared distance below which two points are the same, m². Clipping can reduce a line to one
@@ -22,29 +20,26 @@ const SAME_POINT: f32 = 1e-8;
 const SAME_DEPTH: f32 = 1e-4;
 
 /// The contact of two bodies, each in its own frame.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
-    pub(super) on_a: [f32; 3],
-    pub(super) on_b: [f32; 3],
+    pub(super) on_a: Vector,
+    pub(super) on_b: Vector,
     pub(super) distance: f32,
 }
 
-/// parry and its buffer.
-#[derive(Debug)]
-pub(super) struct Parry {
-    manifold: ContactManifold<(), ()>,
-    places: [Place; MOST],
-    hulls: Hulls,
+impl Place {
+    /// The point on B, in its frame.
+    pub(super) fn contact(&self) -> Contact {
+        Contact { point: self.on_b.to_array(), distance: self.distance }
+    }
 }
 
-impl Default for Parry {
-    fn default() -> Self {
-        Self {
-            manifold: ContactManifold::new(),
-            places: [Place::default(); MOST],
-            hulls: Hulls::default(),
-        }
-    }
+/// parry and its buffers.
+#[derive(Debug, Default)]
+pub(super) struct Parry {
+    manifold: ContactManifold<(), ()>,
+    places: Vec<Place>,
+    hulls: Hulls,
 }
 
 impl Parry {
@@ -52,29 +47,24 @@ impl Parry {
     /// along which they touch, in the frame of A. `None` if parry does not know the pair.
     pub(super) fn ask(
         &mut self,
-        [a, b]: [&Body; 2],
-        [geometry_a, geometry_b]: [Geometry; 2],
-    ) -> Option<([f32; 3], &[Place])> {
-        let b_in_a = pose(a).inv_mul(&pose(b));
-        let curved = self.parry(&b_in_a, geometry_a, geometry_b)?;
-        let mut count = 0;
+        b_in_a: &Pose,
+        [a, b]: [Geometry; 2],
+    ) -> Option<(Vector, &[Place])> {
+        self.places.clear();
+        let curved = self.parry(b_in_a, a, b)?;
         for point in &self.manifold.points {
-            let same = |other: &Place| {
-                Vector::from_array(other.on_b).distance_squared(point.local_p2) < SAME_POINT
-            };
+            let same = |other: &Place| other.on_b.distance_squared(point.local_p2) < SAME_POINT;
             // In this form a NaN is no contact.
             let near = point.dist <= MARGIN && point.dist.is_finite() && point.local_p2.is_finite();
-            let known = curved && self.places[..count].iter().any(same);
-            if near && !known && count < MOST {
-                self.places[count] = Place {
-                    on_a: point.local_p1.to_array(),
-                    on_b: point.local_p2.to_array(),
+            if near && !(curved && self.places.iter().any(same)) {
+                self.places.push(Place {
+                    on_a: point.local_p1,
+                    on_b: point.local_p2,
                     distance: point.dist,
-                };
-                count += 1;
+                });
             }
         }
-        Some((self.manifold.local_n1.to_array(), &self.places[..count]))
+        Some((self.manifold.local_n1, &self.places))
     }
 
     /// Has parry compute the manifold of two geometries; returns whether one has a curved side.
@@ -155,9 +145,7 @@ fn with_shape<R>(
     })
 }
 
-fn pose(body: &Body) -> Pose {
-    Pose::from_parts(
-        Vector::from_array(body.pose.position),
-        Rotation::from_array(body.pose.orientation),
-    )
+pub(super) fn pose(body: &Body) -> Pose {
+    let Body { pose, .. } = body;
+    Pose::from_parts(Vector::from_array(pose.position), Rotation::from_array(pose.orientation))
 }

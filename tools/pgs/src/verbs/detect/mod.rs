@@ -11,8 +11,7 @@ mod timing;
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use scene::BroadPhase;
+use clap::Args;
 use zynq_pgs::StepParameters;
 use zynq_pgs::emulation::Build;
 
@@ -29,15 +28,14 @@ const EXAMPLES: &str = "\
 Examples:
   pgs detect --input tests/golden/pile5_step60 --compare
   pgs detect --input tests/golden/two_cubes --compare --json
-  pgs detect --grid 20x20x20 --drop 0 --broad-phase sweep
+  pgs detect --grid 20x20x20 --drop 0
 
 The folder is one for `pgs solve`. Body 0 is the ground, a box of 800 m whose top is y = 0; every
 other body is a cube of 2 m, as in Bullet's demo: a folder says nothing of shapes. Two bodies up to
 2 cm apart collide.
 
-Each broad phase runs twice: from nothing, and again after all bodies have moved by their
-velocities for one time step, with its lists kept. Both must find one list of pairs each time, else
-the exit code is 1.
+Detection runs twice: from nothing, and again after all bodies have moved by their velocities for
+one time step, with everything kept.
 
 --compare holds pairs, normals and points against the folder's. It fails, with exit code 1, if a
 pair deeper than 1 mm is missing or extra. Every normal more than 0.01 degrees off and every point
@@ -55,7 +53,7 @@ more than 1 mm off is counted under its cause:
   normal    the point belongs to a collision whose normal differs, too
   unknown   none of these";
 
-/// Detect collisions with both broad phases, and compare them with a folder's.
+/// Detect collisions, time the detection, and compare them with a folder's.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct DetectArgs {
@@ -66,10 +64,7 @@ pub(crate) struct DetectArgs {
     /// or extra.
     #[arg(long, requires = "input")]
     compare: bool,
-    /// Broad phase: a grid of cells, sweep and prune, or both.
-    #[arg(long, value_enum, default_value_t = BroadPhases::Both)]
-    broad_phase: BroadPhases,
-    /// Threads for the grid and the contacts; sweep and prune uses one. No result depends on it.
+    /// Threads; no result depends on them.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: u16,
     /// Runs for the median times.
@@ -77,24 +72,6 @@ pub(crate) struct DetectArgs {
     runs: u32,
     #[command(flatten)]
     scene: SceneArgs,
-}
-
-/// The broad phases that run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum BroadPhases {
-    Grid,
-    Sweep,
-    Both,
-}
-
-impl BroadPhases {
-    const fn each(self) -> &'static [BroadPhase] {
-        match self {
-            Self::Grid => &[BroadPhase::Grid],
-            Self::Sweep => &[BroadPhase::Sweep],
-            Self::Both => &[BroadPhase::Grid, BroadPhase::Sweep],
-        }
-    }
 }
 
 /// Detects, and compares.
@@ -124,32 +101,19 @@ pub(crate) fn run(
             (scene, None, StepParameters::default().time_step)
         }
     };
-    scene.set_threads(args.threads.into());
-    let timings: Vec<Timing> = args
-        .broad_phase
-        .each()
-        .iter()
-        .map(|broad_phase| Timing::measure(&mut scene, *broad_phase, time_step, args.runs))
-        .collect();
-    let is_one_list = timings.windows(2).all(|two| two[0].finds_the_lists_of(&two[1]));
+    let timing = Timing::measure(&mut scene, args.threads, time_step, args.runs);
     let comparison = input
         .as_ref()
         .filter(|_| args.compare)
         .map(|input| Comparison::of(&scene, input.collisions()));
 
-    let shown = Shown {
-        args,
-        scene: &scene,
-        time_step,
-        timings: &timings,
-        is_one_list,
-        comparison: comparison.as_ref(),
-    };
+    let shown =
+        Shown { args, scene: &scene, time_step, timing: &timing, comparison: comparison.as_ref() };
     if common.json {
         writeln!(out, "{:#}", shown.to_json())?;
     } else {
         shown.print(out)?;
     }
     let agrees = comparison.is_none_or(|comparison| comparison.agrees());
-    Ok(if agrees && is_one_list { Verdict::Done } else { Verdict::Differs })
+    Ok(if agrees { Verdict::Done } else { Verdict::Differs })
 }

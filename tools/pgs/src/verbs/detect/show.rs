@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::DetectArgs;
 use super::cause::{NormalCause, PointCause};
 use super::comparison::{Comparison, OneSided, Pair, Tally};
-use super::timing::Timing;
+use super::timing::{Phases, Timing};
 use crate::numbers::{grouped, number};
 use crate::output::facts::fact;
 use crate::output::table::{Column, heading, line};
@@ -19,9 +19,7 @@ pub(super) struct Shown<'a> {
     pub(super) args: &'a DetectArgs,
     pub(super) scene: &'a Scene,
     pub(super) time_step: f32,
-    pub(super) timings: &'a [Timing],
-    /// Whether all broad phases found the same lists.
-    pub(super) is_one_list: bool,
+    pub(super) timing: &'a Timing,
     pub(super) comparison: Option<&'a Comparison>,
 }
 
@@ -77,38 +75,20 @@ impl Shown<'_> {
             number(depth.largest * 1e3),
         );
         fact(out, "collisions", &collisions)?;
-        for timing in self.timings {
+        let Timing { first, next } = self.timing;
+        let later = format!("{} s later", number(self.time_step.into()));
+        for (name, phases) in [("from nothing", first), (&*later, next)] {
             let times = format!(
-                "broad phase {:.3} ms from nothing, {:.3} ms {} s later; narrow phase {:.3} ms",
-                milliseconds(timing.first),
-                milliseconds(timing.next),
-                number(self.time_step.into()),
-                milliseconds(timing.narrow),
+                "{name}: broad phase {:.3} ms, narrow phase {:.3} ms, {} with near bounding boxes",
+                milliseconds(phases.broad),
+                milliseconds(phases.narrow),
+                grouped(phases.pairs as u64),
             );
-            fact(out, timing.name(), &times)?;
+            fact(out, "detection", &times)?;
         }
-        fact(out, "pairs", &self.lists_text())?;
         match self.comparison {
             Some(comparison) => print_comparison(comparison, out),
             None => Ok(()),
-        }
-    }
-
-    /// The lists of the broad phases, in words.
-    fn lists_text(&self) -> String {
-        let counts = |timing: &Timing| {
-            let [first, next] = [&timing.pairs, &timing.next_pairs];
-            format!("{}, then {}", grouped(first.len() as u64), grouped(next.len() as u64))
-        };
-        match self.timings {
-            [one] => format!("{} with near bounding boxes", counts(one)),
-            [one, ..] if self.is_one_list => {
-                format!("{} with near bounding boxes, one list by grid and sweep", counts(one))
-            }
-            all => {
-                let each = all.iter().map(|timing| format!("{} {}", timing.name(), counts(timing)));
-                format!("DIFFERENT lists: {}", each.collect::<Vec<_>>().join("; "))
-            }
         }
     }
 
@@ -120,16 +100,13 @@ impl Shown<'_> {
             Some(path) => json!({ "input": path.display().to_string() }),
             None => self.args.scene.to_json(),
         };
-        let broad_phases = self.timings.iter().map(|timing| {
+        let phases = |phases: &Phases| {
             json!({
-                "name": timing.name(),
-                "pairs": timing.pairs.len(),
-                "next_pairs": timing.next_pairs.len(),
-                "first_ms": milliseconds(timing.first),
-                "next_ms": milliseconds(timing.next),
-                "narrow_ms": milliseconds(timing.narrow),
+                "pairs": phases.pairs,
+                "broad_ms": milliseconds(phases.broad),
+                "narrow_ms": milliseconds(phases.narrow),
             })
-        });
+        };
         json!({
             "schema": SCHEMA,
             "verb": "detect",
@@ -143,8 +120,8 @@ impl Shown<'_> {
             "points": depth.contacts,
             "penetrating_points": depth.penetrating,
             "deepest_m": depth.largest,
-            "broad_phases": broad_phases.collect::<Vec<_>>(),
-            "one_list": (self.timings.len() > 1).then_some(self.is_one_list),
+            "first": phases(&self.timing.first),
+            "next": phases(&self.timing.next),
             "comparison": self.comparison.map(comparison_json),
         })
     }

@@ -19,6 +19,7 @@ use crate::permutation::{self, Permutation};
 use crate::pile;
 use crate::step_input;
 use crate::verbs::formats::{EACH_ONCE, numbers};
+use scene::Scene;
 use step_folder::folder::Folder;
 
 /// The start of the runs, and the number of their steps.
@@ -52,6 +53,8 @@ pub(super) struct Start<'a> {
     folder: Option<Folder>,
     /// The order of Bullet's GPU, if the folder has it.
     recorded_order: Option<Vec<u32>>,
+    /// The scene; none for a folder.
+    scene: Option<Scene>,
     bodies: Vec<Body>,
     shapes: Vec<Shape>,
     pub(super) parameters: StepParameters,
@@ -65,11 +68,12 @@ impl<'a> Start<'a> {
         let own = folder.as_ref().map_or_else(StepParameters::default, |folder| folder.parameters);
         let parameters = args.deadline.apply(args.solver.apply(own));
         let parameters = parameters.with_order(Some(Order::AsGiven));
-        let (bodies, shapes) = match &folder {
-            Some(folder) => (folder.bodies.clone(), folder.shapes.clone()),
+        let (scene, bodies, shapes) = match &folder {
+            Some(folder) => (None, folder.bodies.clone(), folder.shapes.clone()),
             None => {
                 let scene = args.scene.build(&Build::default())?;
-                (scene.bodies().to_vec(), scene.shapes().to_vec())
+                let (bodies, shapes) = (scene.bodies().to_vec(), scene.shapes().to_vec());
+                (Some(scene), bodies, shapes)
             }
         };
         let recorded_order = match &folder {
@@ -77,7 +81,7 @@ impl<'a> Start<'a> {
             None => None,
         };
         let steps = if folder.is_some() { 1 } else { args.steps.unwrap_or(STEPS) };
-        Ok(Self { args, folder, recorded_order, bodies, shapes, parameters, steps })
+        Ok(Self { args, folder, recorded_order, scene, bodies, shapes, parameters, steps })
     }
 
     pub(super) fn shapes(&self) -> &[Shape] {
@@ -124,13 +128,10 @@ impl<'a> Start<'a> {
 
     /// A run from here, in an order; as given if none.
     pub(super) fn run(&self, permutation: Option<Permutation>) -> Result<Run<'_>, Failure> {
-        let world = match &self.folder {
-            Some(folder) => World::Folder { folder, bodies: self.bodies.clone() },
-            None => {
-                let mut scene = self.args.scene.build(&Build::default())?;
-                scene.bodies_mut().copy_from_slice(&self.bodies);
-                World::Scene(Box::new(scene))
-            }
+        let world = match (&self.folder, &self.scene) {
+            (Some(folder), _) => World::Folder { folder, bodies: self.bodies.clone() },
+            (None, Some(scene)) => World::Scene(Box::new(scene.clone())),
+            (None, None) => World::Scene(Box::new(self.args.scene.build(&Build::default())?)),
         };
         Ok(Run::new(world, permutation, self.recorded_order.clone()))
     }
@@ -141,12 +142,11 @@ impl<'a> Start<'a> {
         opened: &mut OpenBoard,
         session: &Session,
     ) -> Result<bool, Failure> {
-        if self.folder.is_some() || self.args.from == 0 {
+        let Some(scene) = self.scene.as_mut().filter(|_| self.args.from > 0) else {
             return Ok(true);
-        }
+        };
         session.expect(self.args.from.into());
-        let mut scene = self.args.scene.build(&Build::default())?;
-        let taken = pile::step_to(&mut scene, opened, &self.parameters, self.args.from, || {
+        let taken = pile::step_to(scene, opened, &self.parameters, self.args.from, || {
             session.advance();
             !session.is_interrupted()
         })?;

@@ -5,24 +5,20 @@
 use zynq_pgs::Contact;
 
 use super::super::MARGIN;
-use super::super::lanes::Portable;
 use super::*;
 use crate::Geometry;
 use crate::fixtures::{LEVEL, bits, body as cube};
 use crate::random::SplitMix64;
 
-/// The collisions of pairs; asserts that the portable lanes find the same bits.
+/// The collisions of pairs, each found anew.
 fn all(
     narrow: &mut Narrow,
     bodies: &[Body],
     geometries: Geometries<'_>,
-    pairs: impl Iterator<Item = (u32, u32)> + Clone,
+    pairs: impl Iterator<Item = (u32, u32)>,
 ) -> Vec<Collision> {
-    let (mut found, mut portable) = (Vec::new(), Vec::new());
-    narrow.collide(bodies, geometries, pairs.clone(), &mut found);
-    Portable.run(Collide { narrow, bodies, geometries, pairs, found: &mut portable });
-    assert_eq!(bits(&found), bits(&portable));
-    found
+    let one = |pair| narrow.collide(bodies, geometries, &mut Touch::unknown(pair));
+    pairs.filter_map(one).collect()
 }
 
 /// The collision of one pair.
@@ -255,5 +251,106 @@ fn pairs_of_all_kinds_side_by_side_are_as_each_alone() {
         let single = pairs().filter_map(|pair| one(&mut narrow, &bodies, geometries, pair));
         assert!(found.len() > 100, "{}", found.len());
         assert_eq!(bits(&found), bits(&single.collect::<Vec<_>>()));
+    }
+}
+
+/// A cube at rest on the ground, and one above it, 5 mm deep and moved by `way`.
+fn stack(way: [f32; 3], orientation: [f32; 4]) -> [Body; 2] {
+    let [x, y, z] = way;
+    [cube([0.0, 1.0, 0.0], LEVEL), cube([0.5 + x, 2.995 + y, 0.25 + z], orientation)]
+}
+
+/// The collision of both bodies, found anew.
+fn anew(bodies: &[Body]) -> Option<Collision> {
+    one(&mut Narrow::default(), bodies, CUBES, (0, 1))
+}
+
+const CUBES: Geometries<'static> = Geometries(&[Some(SPHERE), Some(Geometry::CUBE)]);
+
+#[test]
+fn a_second_look_at_the_same_poses_finds_the_same_bits() {
+    let (mut narrow, mut touch) = (Narrow::default(), Touch::unknown((0, 1)));
+    let bodies = stack([0.0; 3], [0.001, 0.2, 0.0, 0.979_795_4]);
+    let first = narrow.collide(&bodies, CUBES, &mut touch).expect("contact");
+    let second = narrow.collide(&bodies, CUBES, &mut touch).expect("contact");
+    assert_eq!(bits(&[first]), bits(&[second]));
+}
+
+#[test]
+fn contacts_that_are_kept_follow_the_poses() {
+    let (mut narrow, mut touch) = (Narrow::default(), Touch::unknown((0, 1)));
+    narrow.collide(&stack([0.0; 3], LEVEL), CUBES, &mut touch).expect("contact");
+    let found_at = touch.b_in_a;
+    // Down by 4 mm, aside by 0.9 mm, and turned by 0.1 degrees.
+    let moved = stack([0.000_9, -0.004, 0.0], [0.000_872_7, 0.0, 0.0, 1.0]);
+    let found = narrow.collide(&moved, CUBES, &mut touch).expect("contact");
+    assert_eq!(touch.b_in_a, found_at, "kept");
+    let expected = anew(&moved).expect("contact");
+    assert_eq!(found.count, 4);
+    for contact in found.contacts {
+        let near =
+            |other: &&Contact| (0..3).all(|k| (other.point[k] - contact.point[k]).abs() < 2e-3);
+        let same = expected.contacts.iter().find(near).expect("the point is there, too");
+        assert!((same.distance - contact.distance).abs() < 1e-5, "{found:?}, not {expected:?}");
+    }
+    // Up again, and out of reach: nothing is left of them.
+    assert_eq!(narrow.collide(&stack([0.0, 0.026, 0.0], LEVEL), CUBES, &mut touch), None);
+}
+
+#[test]
+fn contacts_are_found_anew_after_a_way_a_turn_or_a_change_of_shape() {
+    let mut ball = stack([0.0; 3], LEVEL);
+    ball[1].shape = 0;
+    ball[1].pose.position[1] = 2.49;
+    for (name, bodies) in [
+        ("across", stack([0.000_8, 0.0, 0.000_8], LEVEL)),
+        ("along", stack([0.0, -0.010_1, 0.0], LEVEL)),
+        ("tilted", stack([0.0; 3], [0.003_5, 0.0, 0.0, 0.999_993_9])),
+        ("turned", stack([0.0; 3], [0.0, 0.003_5, 0.0, 0.999_993_9])),
+        ("shape", ball),
+    ] {
+        let (mut narrow, mut touch) = (Narrow::default(), Touch::unknown((0, 1)));
+        narrow.collide(&stack([0.0; 3], LEVEL), CUBES, &mut touch).expect("contact");
+        let found = narrow.collide(&bodies, CUBES, &mut touch);
+        assert_eq!(bits(found.as_slice()), bits(anew(&bodies).as_slice()), "{name}");
+        assert!(found.is_some(), "{name}");
+    }
+}
+
+#[test]
+fn contacts_do_not_creep_over_an_edge() {
+    let (mut narrow, mut touch) = (Narrow::default(), Touch::unknown((0, 1)));
+    let (mut kept, mut last) = (0, 0.0);
+    for step in 0..4000_u16 {
+        let way = 0.000_4 * f32::from(step);
+        let bodies = stack([way, 0.0, 0.0], LEVEL);
+        let before = touch.b_in_a;
+        let Some(found) = narrow.collide(&bodies, CUBES, &mut touch) else { continue };
+        kept += usize::from(touch.b_in_a == before);
+        last = way;
+        let farthest =
+            found.contacts[..found.count as usize].iter().map(|contact| contact.point[0]);
+        assert!(farthest.fold(f32::MIN, f32::max) < 1.0 + 2e-3 + MARGIN, "{way}: {found:?}");
+    }
+    assert!(kept > 2000, "{kept}");
+    // The cubes no longer overlap from 1.5 m on.
+    assert!((1.499..1.525).contains(&last), "{last}");
+}
+
+#[test]
+fn what_is_known_of_a_pair_stays_with_it_while_it_is_a_candidate() {
+    let mut touches = Vec::new();
+    let mut known: Vec<(u32, u32)> = Vec::new();
+    let mut random = SplitMix64::new(9);
+    for _ in 0..200 {
+        let all = (0..4).flat_map(|a| (0..4).map(move |b| (a, b)));
+        let candidates: Vec<(u32, u32)> = all.filter(|_| random.below(2) == 0).collect();
+        follow(&mut touches, &candidates);
+        assert!(touches.iter().map(|touch| touch.pair).eq(candidates.iter().copied()));
+        for touch in &mut touches {
+            assert_eq!(touch.count == 1, known.contains(&touch.pair), "{candidates:?}, {known:?}");
+            touch.count = 1;
+        }
+        known = candidates;
     }
 }
