@@ -324,18 +324,6 @@ pub enum InputError {
         limit: u32,
     },
 
-    /// The masses of this number of shapes are streamed, and their frictions cannot be.
-    #[error(
-        "the step wants a friction for each of {found} shapes, and the bitstream's table has {limit} \
-         entries: give fewer shapes, or clear `StepParameters::shape_friction`"
-    )]
-    FrictionsBeyondTable {
-        /// Shapes given.
-        found: usize,
-        /// Entries of the table.
-        limit: u32,
-    },
-
     /// The friction of a shape is negative, no number, or so large that a product of two leaves binary16.
     #[error(
         "shape {shape}: its friction is {found}, expected 0 to {most}: correct it",

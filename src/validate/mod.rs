@@ -160,10 +160,6 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     if needs.bodies > 0 {
         check_room(&needs, limits)?;
         check_shapes(shapes, &needs, limits)?;
-        let (found, limit) = (shapes.len(), limits.shape_capacity);
-        if parameters.shape_friction && exceeds(found, limit) {
-            return Err(InputError::FrictionsBeyondTable { found, limit });
-        }
     }
     let held = Held::by(&limits.variant.numbers);
     let flush_subnormals = limits.flush_subnormals;

@@ -6,7 +6,7 @@ use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, Profile};
 use bitstream_model::{BoardConfig, FaultPlan};
 use zynq_pgs::order::Order;
-use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, Velocity};
+use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
 
 const WITHOUT_ROOM: [&Profile; 1] = [&HALF];
 
@@ -97,15 +97,4 @@ fn a_board_that_has_no_frictions_of_shapes_refuses_the_step() {
         assert!(text.contains("a friction for each shape"), "{text}");
         assert!(text.contains("profiles that could: half)"), "{text}");
     }
-}
-
-#[test]
-fn frictions_of_more_shapes_than_the_table_holds_are_refused() {
-    let (mut bodies, collisions) = sliding(1);
-    let shapes = vec![Shape::isotropic(1.0, 1.5); 65];
-    let config = BoardConfig { profile: &HALF, inertia: Inertia::World, ..BoardConfig::default() };
-    let (_, mut accelerator) = open_with(config, None, &shapes);
-    let error = accelerator.step(&mut bodies, &collisions, &parameters()).expect_err("65 shapes");
-    let expected = InputError::FrictionsBeyondTable { found: 65, limit: 64 };
-    assert!(matches!(&error, Error::Input(found) if *found == expected), "{error}");
 }

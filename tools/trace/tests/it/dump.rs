@@ -113,7 +113,7 @@ pub(crate) fn assert_agrees(taken: &Taken) {
     assert_eq!(of(true), after.register_writes - before.register_writes);
     let log: Vec<_> =
         taken.accesses.iter().copied().filter(|one| one.cycle > before.cycles).collect();
-    assert!(log.len() > 20 && accesses.ends_with(&log), "{accesses:?}");
+    assert!(log.len() >= 20 && accesses.ends_with(&log), "{accesses:?}");
     assert_eq!(dump.rises("board.cpu.write").len() as u64, of(true));
     assert_eq!(dump.rises("board.cpu.read").len() as u64, of(false));
     let bells = dump.rises("board.cpu.doorbell").len() as u64;
