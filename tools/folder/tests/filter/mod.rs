@@ -18,10 +18,11 @@ pub(crate) fn refuse(calls: &[libc::c_long], errno: i32) -> Result<(), ()> {
     filters.push(action(libc::SECCOMP_RET_ALLOW, 0));
     let program = sock_fprog { len: filters.len() as u16, filter: filters.as_mut_ptr() };
     let [yes, none] = [1, 0_u64];
-    // SAFETY: it takes numbers alone.
+    // SAFETY: PR_SET_NO_NEW_PRIVS takes numbers; the kernel accesses no memory of this process.
     let set = unsafe { libc::prctl(libc::PR_SET_NO_NEW_PRIVS, yes, none, none, none) };
     let mode = u64::from(libc::SECCOMP_MODE_FILTER);
-    // SAFETY: `program` leads to `filters`; both live through the call, which copies them.
+    // SAFETY: `program` has the address and the length of `filters`. Both live through the call, and the
+    // kernel copies them before it returns.
     let filtered = unsafe { libc::prctl(libc::PR_SET_SECCOMP, mode, &raw const program) };
     if set == 0 && filtered == 0 { Ok(()) } else { Err(()) }
 }

@@ -1,10 +1,11 @@
-//! Finds where two bodies touch, and keeps it while they hardly move against each other.
+//! Finds where two bodies touch, and keeps the contacts while the bodies hardly move against each
+//! other.
 //!
-//! [parry](super::parry) finds the contacts of a pair, of which [`reduce`](super::reduce) chooses
-//! four. They stay on B, and their normal on A, until B has moved or turned on A by more than the
-//! tolerances below: the distances follow each pose meanwhile. Each pose is compared with that of
-//! the last search, not with the one before it, so that contacts do not creep over an edge. Bullet
-//! keeps its manifolds, too, and lets points drift by 2 cm (`btPersistentManifold`).
+//! [parry](super::parry) finds the contacts of a pair; [`reduce`](super::reduce) chooses four of
+//! them. The points then stay on B, and the normal stays on A, until B has moved or turned on A by
+//! more than the tolerances below; the distances follow each pose meanwhile. Each pose is compared
+//! with the pose of the last search, so that contacts do not creep over an edge in small steps.
+//! Bullet keeps its manifolds, too, and lets points drift by 2 cm (`btPersistentManifold`).
 
 use parry3d::math::{Pose, Vector};
 use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
@@ -54,7 +55,7 @@ impl Touch {
         }
     }
 
-    /// Whether the contacts are still those of these shapes at this pose; false for a NaN.
+    /// Whether the contacts may be kept for these shapes at this pose; never if the pose has a NaN.
     fn holds(&self, shapes: [u32; 2], b_in_a: &Pose) -> bool {
         let way = b_in_a.translation - self.b_in_a.translation;
         let along = way.dot(self.axis);
@@ -90,8 +91,8 @@ impl Touch {
     }
 }
 
-/// Makes one touch for each candidate: the earlier one of a pair that was a candidate before. Both
-/// lists are sorted.
+/// Makes one touch for each candidate. A pair that was a candidate before keeps its touch. Both lists
+/// are sorted.
 pub(super) fn follow(touches: &mut Vec<Touch>, candidates: &[(u32, u32)]) {
     let mut left = candidates.iter().copied().peekable();
     touches.retain(|touch| {
