@@ -131,7 +131,7 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
             described(&capabilities.variant),
             capabilities.clock_khz,
             capabilities.body_capacity,
-            match capabilities.extensions.streamed_masses {
+            match capabilities.variant.has_streamed_masses() {
                 true => "any number of".to_owned(),
                 false => capabilities.shape_capacity.to_string(),
             },

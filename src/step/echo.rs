@@ -147,9 +147,8 @@ impl Accelerator {
 /// The plan of an echo: bodies alone.
 fn plan(bodies: usize, variant: Variant) -> Plan {
     let (collisions, passes) = (0, Passes::default());
-    // The shapes of an echo fit every table, and it needs the poses.
-    let (streamed_masses, velocities_only) = (false, false);
-    Plan { bodies, collisions, passes, variant, streamed_masses, velocities_only }
+    // The shapes of an echo fit every table.
+    Plan { bodies, collisions, passes, variant, streamed_masses: false }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

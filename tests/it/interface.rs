@@ -202,20 +202,11 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::flags::WARM_START.mask(), 1 << 3);
     assert_eq!(control::flags::IMPULSES_OUT.mask(), 1 << 4);
     assert_eq!(control::flags::STREAMED_MASSES.mask(), 1 << 5);
-    assert_eq!(control::flags::VELOCITIES_ONLY.mask(), 1 << 6);
-    assert_eq!(control::flags::SHAPE_FRICTION.mask(), 1 << 7);
     assert_eq!(control::features::CHECKSUMS.mask(), 1 << 0);
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
     assert_eq!(control::features::IMPULSE_SUM.mask(), 1 << 3);
     assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 4);
-    assert_eq!(control::features::SPIN_DAMPING.mask(), 1 << 5);
-    assert_eq!(control::features::KINEMATIC.mask(), 1 << 6);
-    assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
-    assert_eq!(control::features::WARM_START.mask(), 1 << 8);
-    assert_eq!(control::features::STREAMED_MASSES.mask(), 1 << 9);
-    assert_eq!(control::features::VELOCITIES_ONLY.mask(), 1 << 10);
-    assert_eq!(control::features::SHAPE_FRICTION.mask(), 1 << 11);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,
@@ -251,7 +242,6 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::reset::RESET.mask(), 1);
     assert_eq!((control::SHAPE_TABLE, control::SHAPE_STRIDE), (0x400, 16));
     assert_eq!((control::SHAPE_INVERSE_MASS, control::SHAPE_INVERSE_INERTIA), (0, 4));
-    assert_eq!(control::SHAPE_FRICTION, 8);
 }
 
 #[test]

@@ -8,7 +8,6 @@ use pgs_interface::axi_dma::{
 };
 use pgs_interface::control;
 use pgs_interface::descriptor::status;
-use pgs_interface::extension::Extensions;
 
 use crate::common::ring::{Ring, WHOLE, halves};
 use crate::common::{BOTH, CORES, Host, numbered};
@@ -194,18 +193,6 @@ fn curdesc_is_cut_to_bits_31_6_and_ignored_while_running() {
         let kind = ViolationKind::CurdescWhileRunning { core: 0, direction };
         assert_eq!(host.violations(), [kind, kind]);
     }
-}
-
-#[test]
-fn a_board_without_an_extension_lacks_its_register() {
-    let config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };
-    let host = Host::lenient(config);
-    let address = CONTROL_BASE + 0x78;
-    host.port.write32(address, u32::MAX);
-    assert_eq!(host.port.read32(address), 0);
-    let kind = ViolationKind::ReservedRegister { address };
-    assert_eq!(host.violations(), [kind, kind]);
-    assert_eq!(host.control(control::FEATURES), 0b1011);
 }
 
 #[test]

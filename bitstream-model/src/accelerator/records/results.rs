@@ -3,10 +3,10 @@
 use super::array::{Array, Row, beat_of};
 use super::striping::{PerStream, STREAMS_MAX};
 use crate::stream::Stream;
-use pgs_interface::record::{Beat, result, velocity_result};
+use pgs_interface::record::{Beat, result};
 
 /// A result fills whole beats, even with two rows in a beat.
-const _: () = assert!(result::ROWS.is_multiple_of(2) && velocity_result::ROWS.is_multiple_of(2));
+const _: () = assert!(result::ROWS.is_multiple_of(2));
 
 /// The results while they are being sent.
 #[derive(Debug, Clone, Copy)]
