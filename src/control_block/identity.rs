@@ -27,12 +27,8 @@ pub struct Capabilities {
     pub version: (u32, u32),
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
     pub interlocked: bool,
-    /// Whether words received and sent are summed, which detects a corrupted beat.
-    pub checksums: bool,
     /// Whether subnormal numbers count as zero.
     pub flush_subnormals: bool,
-    /// Whether accumulated normal impulses are summed.
-    pub impulse_sum: bool,
     /// Streams into the accelerator.
     pub mm2s_channels: usize,
     /// Streams out of the accelerator.
@@ -202,9 +198,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         variant,
         version: (major, minor),
         interlocked: features::INTERLOCKED.is_set(able),
-        checksums: features::CHECKSUMS.is_set(able),
         flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
-        impulse_sum: features::IMPULSE_SUM.is_set(able),
         mm2s_channels: channels::MM2S.of(streams) as usize,
         s2mm_channels: channels::S2MM.of(streams) as usize,
         initiation_interval: issue::INTERVAL.of(interval),
@@ -304,7 +298,7 @@ pub(crate) mod fake {
                 (0x100, 0x5047_5331),
                 (0x104, 0x0002_0000),
                 (0x108, 1),
-                (0x10C, 0xB),
+                (0x10C, 0x1),
                 (0x110, 0x0404),
                 (0x114, 0x4444),
                 (0x118, 0x4444),
@@ -344,8 +338,7 @@ mod tests {
     fn a_known_bitstream_is_described() {
         let found = identify_with(&[]).expect("well formed");
         assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (2, 0)));
-        assert!(found.checksums && found.interlocked && found.impulse_sum);
-        assert!(!found.flush_subnormals);
+        assert!(found.interlocked && !found.flush_subnormals);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
         assert_eq!(found.contact, Depth { fill: 374, window: 324 });
         assert_eq!((found.bytes_per_body, found.bytes_per_collision), (24, 16));
@@ -454,9 +447,9 @@ mod tests {
             impulses: Precision::Binary16,
         };
         assert_eq!(found.variant.numbers, expected);
-        let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
+        let found = with(&[], &[(0x10C, 0x3)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
-        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x3)]);
         let error = error.expect_err("no zero").to_string();
         assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
         let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");

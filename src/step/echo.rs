@@ -47,8 +47,8 @@ pub(crate) struct EchoResult {
     pub(crate) results: Vec<Vec<Beat>>,
     /// Sum of the words that the driver sent.
     pub(crate) sent: u32,
-    /// The accelerator's sums of the words that it received and sent, if it keeps sums.
-    pub(crate) sums: Option<(u32, u32)>,
+    /// The accelerator's sums of the words that it received and sent.
+    pub(crate) sums: (u32, u32),
     /// Interrupts that woke the driver.
     pub(crate) interrupts: u64,
     /// Descriptors used.

@@ -251,8 +251,8 @@ fn another_design_is_named_by_its_identification() {
 
 #[test]
 fn another_interface_version_is_named() {
-    let quirks = Quirks { version: 0x0002_0001, ..Quirks::default() };
-    fails(quirks, "interface version", true, ["2.1", "1.x", "driver that belongs"]);
+    let quirks = Quirks { version: 0x0001_0001, ..Quirks::default() };
+    fails(quirks, "interface version", true, ["1.1", "2.x", "driver that belongs"]);
 }
 
 #[test]

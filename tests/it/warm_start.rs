@@ -1,4 +1,4 @@
-//! Compares the warm start of interface 1.2 with the direct solver, bit for bit, on every board and in
+//! Compares the warm start with the direct solver, bit for bit, on every board and in
 //! every order, and holds its passes, bytes and cycles against the specification.
 #![cfg(feature = "emulation")]
 

@@ -78,16 +78,12 @@ pub mod version {
 pub mod features {
     use super::{Access, Field};
 
-    /// [`SUM_RECEIVED`](super::SUM_RECEIVED) and [`SUM_SENT`](super::SUM_SENT) count.
-    pub const CHECKSUMS: Field = Field::bit("checksums", 0, Access::ReadOnly);
     /// The pipeline waits on a hazard; without it, it reads stale velocities.
-    pub const INTERLOCKED: Field = Field::bit("interlocked", 1, Access::ReadOnly);
+    pub const INTERLOCKED: Field = Field::bit("interlocked", 0, Access::ReadOnly);
+    /// Velocity records carry the world inverse inertia of their body.
+    pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 1, Access::ReadOnly);
     /// Subnormal operands and results count as zero.
     pub const FLUSH_SUBNORMALS: Field = Field::bit("flush_subnormals", 2, Access::ReadOnly);
-    /// [`IMPULSE_SUM_LO`](super::IMPULSE_SUM_LO) counts.
-    pub const IMPULSE_SUM: Field = Field::bit("impulse_sum", 3, Access::ReadOnly);
-    /// Velocity records carry the world inverse inertia of their body.
-    pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -297,11 +293,9 @@ pub const FEATURES: Register = read_only(
     "FEATURES",
     0x10C,
     &[
-        features::CHECKSUMS,
         features::INTERLOCKED,
-        features::FLUSH_SUBNORMALS,
-        features::IMPULSE_SUM,
         features::WORLD_INERTIA,
+        features::FLUSH_SUBNORMALS,
     ],
 );
 /// Numbers of streams.

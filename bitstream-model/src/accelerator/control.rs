@@ -310,10 +310,7 @@ impl Registers {
             _ if offset == VERSION.offset => config.quirks.version,
             _ if offset == PROFILE.offset => profile.id,
             _ if offset == FEATURES.offset => {
-                features::CHECKSUMS.mask()
-                    | features::IMPULSE_SUM.mask()
-                    | features::INTERLOCKED
-                        .put(0, u32::from(config.hazards == Hazards::Interlocked))
+                features::INTERLOCKED.put(0, u32::from(config.hazards == Hazards::Interlocked))
                     | features::FLUSH_SUBNORMALS
                         .put(0, u32::from(config.subnormals == Subnormals::Flush))
                     | features::WORLD_INERTIA.put(0, u32::from(config.inertia == Inertia::World))

@@ -4,7 +4,7 @@
 use half::f16;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::{Inertia, Variant};
-use pgs_interface::record::{BEAT_BYTES, Beat, collision};
+use pgs_interface::record::{BEAT_BYTES, Beat, collision, result};
 use pgs_interface::stripe::Stripe;
 
 use super::scene::{Body, Collision, Lane, Step};

@@ -403,10 +403,10 @@ fn time_can_run_to_its_end_without_harm() {
 fn misread_identity_is_impossible_on_a_live_board() {
     let host = Host::new(BoardConfig::default());
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
-    assert_eq!(host.control(control::VERSION), 0x0001_0003);
+    assert_eq!(host.control(control::VERSION), 0x0002_0000);
     assert_eq!(host.control(control::PROFILE), 1);
-    // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction, warm start, no poses.
-    assert_eq!(host.control(control::FEATURES), 0b101_1110_1011);
+    // Interlocked.
+    assert_eq!(host.control(control::FEATURES), 0b1);
     assert_eq!(host.control(control::CHANNELS), 0x0404);
     // 16 bytes are 2^4.
     assert_eq!(host.control(control::MM2S_WIDTHS), 0x4444);

@@ -26,7 +26,7 @@ pub struct Parameters {
     /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
     /// specification.
     pub smallest_normal: bool,
-    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bit 4.
+    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bit 1.
     pub inertia: Inertia,
     /// The one address segment of every DMA master in the block design, which `FENCE_BASE` and
     /// `FENCE_SIZE` report.

@@ -35,11 +35,6 @@ impl Results {
         self.array.records_in(room) - self.done
     }
 
-    /// Records that are still to be sent.
-    pub(crate) fn left(&self) -> usize {
-        self.array.records - self.done
-    }
-
     /// Sends a record, for which there must be room; returns the sum of its words.
     pub(crate) fn send(&mut self, rows: &[Row], streams: &mut [Stream]) -> u32 {
         let mut sum = 0_u32;
