@@ -107,7 +107,7 @@ pub(crate) fn time_of(cycles: u64, clock_khz: u32) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-        use crate::platform::RegisterMap;
+    use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
     #[test]

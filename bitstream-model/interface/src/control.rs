@@ -292,11 +292,7 @@ pub const PROFILE: Register = read_only("PROFILE", 0x108, &[]);
 pub const FEATURES: Register = read_only(
     "FEATURES",
     0x10C,
-    &[
-        features::INTERLOCKED,
-        features::WORLD_INERTIA,
-        features::FLUSH_SUBNORMALS,
-    ],
+    &[features::INTERLOCKED, features::WORLD_INERTIA, features::FLUSH_SUBNORMALS],
 );
 /// Numbers of streams.
 pub const CHANNELS: Register = read_only("CHANNELS", 0x110, &[channels::MM2S, channels::S2MM]);
