@@ -349,7 +349,7 @@ mod tests {
         let mut lines = Lines::default();
         assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
         let lines = lines.finish();
-        assert_eq!(lines[1].outcome, Outcome::ok("1.2"));
+        assert_eq!(lines[1].outcome, Outcome::ok("2.0"));
         assert!(
             matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
         );

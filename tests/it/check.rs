@@ -82,7 +82,7 @@ fn a_board_as_it_should_be_passes_every_line() {
     let (report, board) = checked(fenced());
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
-    assert_eq!(detail(&report, "interface version"), "1.3");
+    assert_eq!(detail(&report, "interface version"), "2.0");
     assert!(
         detail(&report, "capabilities")
             .starts_with("profile float, 4 + 4 streams of 128 bits, 275000 kHz")

@@ -176,8 +176,8 @@ fn control_registers_stand_at_their_published_offsets() {
         ]
     );
     assert_eq!(control::IDENTIFICATION_VALUE.to_be_bytes(), *b"PGS1");
-    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 3));
-    assert_eq!(control::VERSION.reset, 0x0001_0003);
+    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (2, 0));
+    assert_eq!(control::VERSION.reset, 0x0002_0000);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
     assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
     assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);
