@@ -8,7 +8,6 @@ mod axi_dma;
 mod board;
 mod cast;
 mod config;
-pub mod estimate;
 pub mod external;
 mod fault;
 mod handle;

@@ -223,7 +223,7 @@ fn as_given(input: &OrderInput<'_>, schedule: &mut Schedule) {
 ///
 /// In every order the uses of a body lie a window apart. Beyond that, one entry in 64 and four
 /// windows may be empty. This is a choice: it leaves most piles of the thesis' cubes where they are
-/// (`pgs order --grid` shows the empty entries of either order).
+/// (`pgs thesis order --grid` shows the empty entries of either order).
 pub(super) fn nearby_entries_max(collisions: usize, uses: usize, window: IssueWindow) -> usize {
     let entries = collisions.max(uses.saturating_sub(1) * window.entries());
     // One empty entry in 64 is one beside 63 others.

@@ -7,7 +7,7 @@
 #   --grid    cubes of the pile; default: the thesis' 36x30x36
 #   --steps   steps before the counted one; default: 45
 #
-# Callgrind counts the instructions of `pgs study split` and simulates the caches of the ZCU102's A53. The
+# Callgrind counts the instructions of `pgs thesis split` and simulates the caches of the ZCU102's A53. The
 # instructions are those of x86-64: an aarch64 build differs by tens of percent. The prefetcher is left out. Four
 # cores are computed: one instruction a clock and two, each with two times for memory.
 #
@@ -41,7 +41,7 @@ caches=(--cache-sim=yes --I1=32768,2,64 --D1=32768,4,64 --LL=1048576,16,64)
 count() {
 	attend timeout "${VALGRIND_LIMIT:-1800}" valgrind --tool=callgrind "${caches[@]}" \
 		--toggle-collect="*study::split::measured_$1" --callgrind-out-file="$counts/$1" \
-		"$target_root/release/pgs" study split --grid "$grid" --steps "$steps" --runs 1 --board emulated --json \
+		"$target_root/release/pgs" thesis split --grid "$grid" --steps "$steps" --runs 1 --board emulated --json \
 		>"$counts/$1.json" 2>"$counts/$1.log" || fail "the study under callgrind: $(tail -n 3 "$counts/$1.log")"
 }
 # Instructions, misses of the first level, misses of the second level.

@@ -40,7 +40,7 @@ if ! cmp -s "$work/package-lock.json" "$work/node_modules/.lock"; then
 fi
 
 if [ ${#pages[@]} = 0 ]; then
-	attend cargo build --quiet --locked -p pgs --features report
+	attend cargo build --quiet --locked -p pgs
 	pgs=$target_root/debug/pgs
 	export PGS_BOARD=emulated
 	attend "$pgs" run --grid 6x5x6 --steps 120 --view "$work/cubes.html" > /dev/null
@@ -49,8 +49,8 @@ if [ ${#pages[@]} = 0 ]; then
 	input=tests/golden/pile5_step60
 	[ -z "${PGS_VECTORS-}" ] || input=$PGS_VECTORS/full_step186
 	SECONDS=0
-	attend "$pgs" report --out "$work/report" --quick --input "$input" > /dev/null
-	echo "report --quick: $SECONDS s"
-	pages=("view=$work/cubes.html" "view=$work/shapes.html" "report=$work/report/report.html")
+	attend "$pgs" thesis --all --out "$work/report" --quick --input "$input" > /dev/null
+	echo "thesis --all --quick: $SECONDS s"
+	pages=("view=$work/cubes.html" "view=$work/shapes.html" "report=$work/report/thesis.html")
 fi
 NODE_PATH=$work/node_modules attend node tools/scripts/browser/browser-test.js "$browser" "$work" "${pages[@]}"

@@ -1,6 +1,5 @@
 //! A step's input and output as plain numbers.
 
-use bitstream_model::estimate::StepShape;
 use pgs_interface::control::{self, flags};
 use pgs_interface::profile::{FLOAT, Variant};
 use pgs_interface::record::Beat;
@@ -132,15 +131,6 @@ impl Step {
             .map(|k| ground_contact(k, [0.0, -1.0, 0.0]))
             .collect();
         Self::new(all, collisions)
-    }
-
-    pub(crate) fn shape(&self) -> StepShape {
-        StepShape {
-            bodies: self.bodies.len() as u64,
-            collisions: self.collisions.len() as u64,
-            contact_iterations: self.iterations[0].into(),
-            friction_iterations: self.iterations[1].into(),
-        }
     }
 
     /// Writes the arguments and the shape table.

@@ -1,6 +1,5 @@
 //! The accelerator behind its streams and registers: results, refusals, counters.
 
-use bitstream_model::estimate::{Records, StepCycles, StepTime};
 use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, Subnormals, ViolationKind};
 use pgs_interface::axi_dma::dmasr;
 use pgs_interface::control::{self, ErrorCode, ap_ctrl, irq};
@@ -422,7 +421,7 @@ fn done_is_cleared_by_reading_and_interrupts_by_toggling() {
 }
 
 fn formula(scene: &Step) -> u64 {
-    StepCycles::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape()).total
+    scene.cycles(&FLOAT.default_variant())
 }
 
 fn assert_accounted(outcome: &Outcome, scene: &Step) {
@@ -458,22 +457,6 @@ fn independent_collisions_stall_nowhere_and_wait_only_for_the_start() {
     assert_eq!((outcome.stalls, outcome.hazards), (0, 0));
     assert!(outcome.waits < 3000, "{} cycles", outcome.waits);
     machine.host.assert_no_violation();
-}
-
-#[test]
-fn under_a_bandwidth_limit_a_large_step_takes_the_time_by_formula() {
-    let scene = Step::on_ground(1999, 20_000);
-    for bandwidth in [Bandwidth::ZCU102_SUSTAINED, Bandwidth::BytesPerSecond(4_000_000_000)] {
-        let mut machine = Machine::new(BoardConfig { bandwidth, ..BoardConfig::default() });
-        let outcome = machine.step(&scene).expect("the step completes");
-        assert_accounted(&outcome, &scene);
-        let expected =
-            StepTime::new(&FLOAT.default_variant(), Records::Streamed, &scene.shape(), bandwidth)
-                .seconds;
-        let cycles = u32::try_from(outcome.cycles).expect("a few million");
-        let found = f64::from(cycles) / 275e6;
-        assert!((found / expected - 1.0).abs() < 0.01, "{found} s, by formula {expected} s");
-    }
 }
 
 #[test]

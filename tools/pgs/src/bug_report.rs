@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use step_folder::replace::replace;
 use zynq_pgs::{Diagnosis, Error, StepParameters};
 
-use crate::board::OpenBoard;
-use crate::diagnosis;
-use crate::failure::Failure;
-use crate::options::ordering;
-use crate::output::SCHEMA;
-use crate::output::files::Named;
+use pgs_command::board::OpenBoard;
+use pgs_command::diagnosis;
+use pgs_command::failure::Failure;
+use pgs_command::options::ordering;
+use pgs_command::output::SCHEMA;
+use pgs_command::output::files::Named;
 
 /// The arguments for a failed step.
 #[derive(Debug, Clone, Default, Args)]
@@ -36,7 +36,7 @@ impl FaultArgs {
         parameters
     }
 
-    /// The file of the report, to be told from every other file of the command.
+    /// The file of the report, which no other file of the command may be.
     pub(crate) fn named(&self) -> Option<Named> {
         self.report.as_ref().map(|path| Named::option("report", path))
     }

@@ -5,23 +5,18 @@ use std::ffi::OsString;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
 
-use crate::common::{CommonArgs, CommonOptions, Reads};
 use crate::verbs::Verb;
 use crate::verbs::run::RunArgs;
+use pgs_command::common::{CommonArgs, CommonOptions, Reads};
 
 const EXAMPLES: &str = "\
 Examples:
   pgs                                  step the thesis' scene of 38,880 cubes
   pgs --grid 10x10x10 --steps 60       a smaller one; the same as `pgs run --grid ...`
   pgs solve tests/golden/one_cube --compare
-  pgs detect --input tests/golden/pile5_step60 --compare
-  pgs compare float half               how far two builds of the board diverge
-  pgs formats --input tests/golden/pile5_step60
-  pgs model --collisions 127000 --bodies 38880
-  pgs order --input tests/golden/pile5_step60
-  pgs report --out report              the thesis' tables and figures again
-  pgs study determinism --input tests/golden/pile5_step60
-  pgs study ladder                     the thesis' designs, and the factor that each brings
+  pgs thesis                           the experiments of the thesis part
+  pgs thesis compare float half        one of them: how far two builds of the board diverge
+  pgs thesis --all --out report        the thesis' tables and figures again
   pgs list --json
   pgs check --board emulated           test the emulated board as a real one
   pgs faults                           every fault at every place, and the driver's reaction
@@ -101,16 +96,16 @@ pub(crate) fn parse(
 /// The common options that a verb reads.
 fn reads(verb: &Verb) -> Reads {
     Reads {
-        board: !matches!(verb, Verb::Model(_) | Verb::Load(_) | Verb::Detect(_)),
-        manager: !matches!(verb, Verb::Model(_) | Verb::Detect(_)),
+        board: match verb {
+            Verb::Load(_) => false,
+            Verb::Thesis(args) => args.opens_board(),
+            _ => true,
+        },
+        manager: !matches!(verb, Verb::Thesis(args) if !args.opens_board()),
         accelerator: match verb {
-            Verb::Run(_) | Verb::Solve(_) | Verb::Check(_) | Verb::Faults(_) | Verb::Serve(_) => {
-                true
-            }
-            Verb::Compare(_) | Verb::Study(_) => true,
-            // The step of a folder is measured without taking it.
-            Verb::Formats(args) => args.takes_steps(),
-            _ => false,
+            Verb::List(_) | Verb::Load(_) => false,
+            Verb::Thesis(args) => args.opens_board(),
+            _ => true,
         },
     }
 }
@@ -122,8 +117,8 @@ mod tests {
     use zynq_pgs::{ManagerChoice, MemoryChoice};
 
     use super::*;
-    use crate::common::BoardName;
-    use crate::environment::{BOARD, MEMORY};
+    use pgs_command::common::BoardName;
+    use pgs_command::environment::{BOARD, MEMORY};
 
     fn parsed(line: &str) -> Result<Command, ErrorKind> {
         parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
@@ -179,9 +174,10 @@ mod tests {
             "pgs run --board emulated",
             "pgs --board emulated",
             "pgs solve x --memory uio --board uio",
-            "pgs model",
+            "pgs thesis",
+            "pgs thesis step",
             "pgs load x",
-            "pgs detect --input x",
+            "pgs thesis detection --input x",
         ] {
             parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
         }
@@ -277,8 +273,8 @@ mod tests {
             "pgs --manager fpga",
             "pgs --board served",
             "pgs serve",
-            "pgs model --collisions -1 --bodies 1",
-            "pgs model --collisions 1",
+            "pgs thesis step --collisions -1 --bodies 1",
+            "pgs thesis step --collisions 1",
             "pgs solve",
             "pgs frobnicate",
         ] {

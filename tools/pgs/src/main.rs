@@ -2,32 +2,17 @@
 //! or emulated.
 //!
 //! Results go to stdout, everything else to stderr; with `--json` a fault of the board goes to
-//! both. [`failure`] defines the exit codes.
+//! both. [`pgs_command::failure`] defines the exit codes.
 
 #![forbid(unsafe_code)]
 
-mod board;
 mod bug_report;
 mod cli;
-mod common;
-mod deviation;
-mod diagnosis;
 mod difference;
-mod environment;
-mod failure;
 mod footprint;
-mod histogram;
-mod interrupt;
-mod narrow;
-mod numbers;
-mod options;
-mod output;
 #[cfg(feature = "pages")]
 mod pages;
-mod permutation;
-mod pile;
 mod power;
-mod step_input;
 mod traced;
 mod verbs;
 
@@ -38,6 +23,8 @@ use std::thread;
 
 use signal_hook::consts::SIGXFSZ;
 use signal_hook::flag;
+
+use pgs_command::{environment, failure};
 
 /// Sends the log to stderr: warnings, unless the environment sets another filter.
 fn log_to_stderr() {

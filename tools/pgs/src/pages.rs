@@ -13,7 +13,7 @@ use clap_complete::Shell;
 use clap_mangen::Man;
 
 use crate::cli;
-use crate::failure::{Failure, report_usage};
+use pgs_command::failure::{Failure, report_usage};
 
 /// The first argument that asks for the pages.
 const VERB: &str = "generate";

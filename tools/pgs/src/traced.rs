@@ -11,10 +11,10 @@ use step_folder::replace::Replacement;
 use step_trace::TracedStep;
 use zynq_pgs::{BoardKind, StepReport};
 
-use crate::board::OpenBoard;
-use crate::failure::Failure;
-use crate::options::build::described;
-use crate::output::files::{Named, check_folder, unwritten};
+use pgs_command::board::OpenBoard;
+use pgs_command::failure::Failure;
+use pgs_command::options::build::described;
+use pgs_command::output::files::{Named, check_folder, unwritten};
 
 /// The files that show the inside of a step.
 #[derive(Debug, Clone, Default, Args)]
@@ -39,7 +39,7 @@ const NOTHING: &str = "no clock of the step has passed on the board";
 pub(crate) enum TraceFiles {
     /// All of them.
     Written,
-    /// None: the step was not reached, or ended before the board was asked for anything.
+    /// None: the step was not reached, or ended before the board passed a clock.
     #[default]
     NotWritten,
 }
@@ -58,7 +58,7 @@ impl TracedArgs {
         all.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?)))
     }
 
-    /// The files, to be told from every other file of the command.
+    /// The files, which no other file of the command may be.
     pub(crate) fn named(&self) -> impl Iterator<Item = Named> {
         self.given().map(|(name, path)| Named::option(name, path))
     }

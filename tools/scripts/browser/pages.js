@@ -95,7 +95,7 @@ const FIGURES = [
 ];
 const RECORDED = ["2.97 %", "84.29 %", "99.93 %", "0.02 %", "99.64 %", "0.06 %", "1,528"];
 
-// The page of `pgs report`.
+// The page of `pgs thesis --all`.
 async function report(page, { screenshot }) {
 	const found = await page.evaluate(() => ({
 		figures: Array.from(document.querySelectorAll("figure"), figure => {

@@ -5,6 +5,7 @@
 //! time by the board's clock. The host's own times are on another clock: the trace events have a process
 //! of their own for them, the other two leave them out.
 
+mod a53;
 mod events;
 mod names;
 mod svg;
@@ -15,6 +16,7 @@ use bitstream_model::RegisterAccess;
 use bitstream_model::recording::{Recording, Span};
 use zynq_pgs::StepReport;
 
+pub use a53::{A53_COPIES, a53_copy_seconds};
 pub use events::SCHEMA;
 
 /// A step that was recorded.

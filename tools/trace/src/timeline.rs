@@ -6,7 +6,7 @@
 
 use std::io::{self, Write};
 
-use bitstream_model::estimate::a53_copy_seconds;
+use crate::a53::a53_copy_seconds;
 use bitstream_model::interface::record::BEAT_BYTES;
 use bitstream_model::recording::{ChannelRecording, Span, Stage};
 use bitstream_model::{Direction, StepPhase};

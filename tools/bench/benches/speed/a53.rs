@@ -8,8 +8,8 @@ use std::time::Duration;
 use bench::milliseconds;
 use bench::step::Emulated;
 use bitstream_model::BoardConfig;
-use bitstream_model::estimate::A53_COPIES;
 use bitstream_model::interface::profile::FLOAT;
+use step_trace::A53_COPIES;
 
 use crate::callgrind::{Only, count, is_there};
 use crate::{Options, Outcome};

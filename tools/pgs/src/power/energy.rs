@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use bitstream_model::estimate::thesis::recorded::ZCU102_WATTS;
+use pgs_thesis::estimate::thesis::recorded::ZCU102_WATTS;
 use serde_json::{Value, json};
 
 use super::sensors::{Domain, GAIN_ERROR, Sensors, Watts};

@@ -10,13 +10,13 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
-use crate::board::{self, ChosenBoard};
-use crate::common::CommonArgs;
-use crate::failure::{Failure, Verdict};
-use crate::options::build::{BuildArgs, board_option};
-use crate::output::SCHEMA;
-use crate::output::facts::labelled;
-use crate::output::width::of_terminal;
+use pgs_command::board::{self, ChosenBoard};
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::options::build::{BuildArgs, board_option};
+use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::labelled;
+use pgs_command::output::width::of_terminal;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -8,11 +8,10 @@ use clap::Args;
 use pgs_loading::{AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use serde_json::{Value, json};
 
-use crate::common::CommonArgs;
-use crate::failure::{Cause, Failure, INTERRUPTED, Verdict};
-use crate::interrupt;
-use crate::output::SCHEMA;
-use crate::output::milliseconds;
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Cause, Failure, INTERRUPTED, Verdict};
+use pgs_command::interrupt;
+use pgs_command::output::{SCHEMA, milliseconds};
 
 const EXAMPLES: &str = "\
 Examples on a board:
@@ -60,16 +59,15 @@ pub(crate) struct LoadArgs {
     system_root: PathBuf,
 }
 
-impl From<LoadError> for Failure {
-    fn from(error: LoadError) -> Self {
-        let next = error.next();
-        let cause = match error.at_fault() {
-            AtFault::Caller => Cause::Input,
-            AtFault::System => Cause::NoBoard,
-            AtFault::Logic => Cause::Hardware,
-        };
-        Self::new(cause, error).next(next)
-    }
+/// The failure of a bitstream that is not loaded.
+fn failure(error: LoadError) -> Failure {
+    let next = error.next();
+    let cause = match error.at_fault() {
+        AtFault::Caller => Cause::Input,
+        AtFault::System => Cause::NoBoard,
+        AtFault::Logic => Cause::Hardware,
+    };
+    Failure::new(cause, error).next(next)
 }
 
 /// Loads a bitstream, or judges the files.
@@ -89,7 +87,7 @@ pub(crate) fn run(
         replace_others: args.replace_others,
     };
     if args.check {
-        let judged = pgs_loading::check(&request)?;
+        let judged = pgs_loading::check(&request).map_err(failure)?;
         if common.json {
             writeln!(out, "{:#}", document(args, &judged))?;
         } else {
@@ -104,11 +102,11 @@ pub(crate) fn run(
     interrupt::take_over(move || {
         seen.end(|error| {
             // With stderr closed, the exit code still tells it.
-            let _ = writeln!(io::stderr(), "{}", Failure::from(error).chain());
+            let _ = writeln!(io::stderr(), "{}", failure(error).chain());
             process::exit(INTERRUPTED.into());
         });
     });
-    let loaded = pgs_loading::load(&system, &request, &progress)?;
+    let loaded = pgs_loading::load(&system, &request, &progress).map_err(failure)?;
     if common.json {
         let nodes: Vec<Value> = loaded
             .nodes

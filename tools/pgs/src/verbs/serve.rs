@@ -10,15 +10,15 @@ use clap::Args;
 use serde_json::json;
 use zynq_pgs::{MemoryChoice, StepParameters};
 
-use crate::board::{external_accelerator, not_built};
-use crate::common::{BoardName, CommonArgs};
-use crate::failure::{Cause, Failure, Verdict};
-use crate::interrupt;
-use crate::numbers::grouped;
-use crate::options::build::{BuildArgs, described};
-use crate::options::planned::PlannedArgs;
-use crate::output::SCHEMA;
-use crate::output::files::{Files, Named};
+use pgs_command::board::{external_accelerator, not_built};
+use pgs_command::common::{BoardName, CommonArgs};
+use pgs_command::failure::{Cause, Failure, Verdict};
+use pgs_command::interrupt;
+use pgs_command::numbers::grouped;
+use pgs_command::options::build::{BuildArgs, described};
+use pgs_command::options::planned::PlannedArgs;
+use pgs_command::output::SCHEMA;
+use pgs_command::output::files::{Files, Named};
 
 const EXAMPLES: &str = "\
 Examples:

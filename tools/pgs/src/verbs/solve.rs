@@ -8,25 +8,25 @@ use scene::kinetic_energy;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
-use crate::board;
 use crate::bug_report::FaultArgs;
-use crate::common::CommonArgs;
 use crate::difference::{self, Difference};
-use crate::failure::{Failure, Verdict};
-use crate::interrupt::Interrupt;
-use crate::numbers::{Bound, grouped};
-use crate::options::build::BuildArgs;
-use crate::options::ordering::OrderingArgs;
-use crate::options::planned::PlannedArgs;
-use crate::options::solver::{DeadlineArgs, SolverArgs};
-use crate::output::SCHEMA;
-use crate::output::facts::fact;
-use crate::output::files::{Files, Named, unwritten};
-use crate::output::order;
-use crate::output::{limit_text, milliseconds};
-use crate::permutation::{self, Permutation};
-use crate::step_input;
 use crate::traced::TracedArgs;
+use pgs_command::board;
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::interrupt::Interrupt;
+use pgs_command::numbers::{Bound, grouped};
+use pgs_command::options::build::BuildArgs;
+use pgs_command::options::ordering::OrderingArgs;
+use pgs_command::options::planned::PlannedArgs;
+use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
+use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::fact;
+use pgs_command::output::files::{Files, Named, unwritten};
+use pgs_command::output::order;
+use pgs_command::output::{limit_text, milliseconds};
+use pgs_command::permutation::{self, Permutation};
+use pgs_command::step_input;
 use step_folder::digest;
 use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
 use step_folder::npy::{self, Dimensions};
@@ -447,7 +447,7 @@ impl StepResult {
                 "integrate": self.parameters.integrate,
                 "permutation": self.permutation.map(Permutation::text),
             },
-            "step": crate::output::report_json(&self.report),
+            "step": pgs_command::output::report_json(&self.report),
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],

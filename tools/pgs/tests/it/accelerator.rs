@@ -122,21 +122,22 @@ fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
 #[test]
 fn the_accelerator_of_a_comparison_is_board_b() {
     let ran =
-        run("compare float float --grid 2x2x2 --steps 1 --accelerator rtl:/no/such".split(' '));
+        run("thesis compare float float --grid 2x2x2 --steps 1 --accelerator rtl:/no/such"
+            .split(' '));
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("board B (float)"), "{}", ran.stderr);
     assert!(ran.stderr.contains("the simulator /no/such cannot be started"), "{}", ran.stderr);
 }
 
 #[test]
-fn formats_steps_a_scene_on_the_accelerator_and_a_folder_on_none() {
-    let scene = "formats --grid 2x2x2 --step 2 --board emulated --accelerator rtl:/no/such";
+fn an_experiment_steps_a_scene_on_the_accelerator_and_detection_has_none() {
+    let scene = "thesis formats --grid 2x2x2 --step 2 --board emulated --accelerator rtl:/no/such";
     let ran = run(scene.split(' '));
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("the simulator /no/such cannot be started"), "{}", ran.stderr);
     let folder = golden("one_cube");
     let folder = folder.to_str().expect("a path in UTF-8");
-    let ran = run(["formats", "--input", folder, "--accelerator", "rtl:/no/such"]);
+    let ran = run(["thesis", "detection", "--input", folder, "--accelerator", "rtl:/no/such"]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("this command takes no --accelerator"), "{}", ran.stderr);
 }

@@ -68,9 +68,9 @@ fn contact_arrays_of_nothing_are_no_collisions_whatever_their_type() {
         let ran = solve(folder.path(), &["--digest"]);
         assert_eq!((ran.code, &ran.stdout), (Some(0), &expected.stdout), "{descr}: {}", ran.stderr);
         for verb in [
-            &["formats", "--input"][..],
-            &["order", "--runs", "1", "--input"],
-            &["compare", "float", "half", "--input"],
+            &["thesis", "formats", "--input"][..],
+            &["thesis", "order", "--runs", "1", "--input"],
+            &["thesis", "compare", "float", "half", "--input"],
         ] {
             let ran = with_folder(verb, &folder);
             assert_eq!(ran.code, Some(0), "{verb:?}: {}", ran.stderr);
@@ -116,9 +116,9 @@ fn a_step_without_bodies_is_a_step_unless_a_collision_names_one() {
             for verb in [
                 &["solve"][..],
                 &["solve", "--json"],
-                &["formats", "--input"],
-                &["order", "--runs", "1", "--input"],
-                &["compare", "float", "half", "--input"],
+                &["thesis", "formats", "--input"],
+                &["thesis", "order", "--runs", "1", "--input"],
+                &["thesis", "compare", "float", "half", "--input"],
             ] {
                 let ran = with_folder(verb, &folder);
                 assert_eq!(ran.code, Some(0), "{verb:?}: {}", ran.stderr);

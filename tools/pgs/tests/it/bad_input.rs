@@ -270,13 +270,13 @@ proptest! {
             }
             fs::write(&path, bytes).expect("the array");
         }
-        for (verb, options) in [("solve", STAGES[stage]), ("detect", &["--runs", "1", "--input"])] {
+        for (verb, options) in [(&["solve", "--compare"][..], STAGES[stage]), (&["thesis", "detection"], &["--input"])] {
             let mut pgs = pgs();
-            let output = pgs.arg(verb).arg("--compare").args(options).arg(folder.path()).output();
+            let output = pgs.args(verb).args(options).arg(folder.path()).output();
             let ran = Ran::from(output.expect("it starts"));
             prop_assert!(
                 matches!(ran.code, Some(0..=2)),
-                "{verb} {damages:?}: {:?} {}", ran.code, ran.stderr
+                "{verb:?} {damages:?}: {:?} {}", ran.code, ran.stderr
             );
             prop_assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
         }

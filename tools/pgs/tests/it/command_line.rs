@@ -21,10 +21,10 @@ fn every_help_has_an_example() {
         &[][..],
         &["run"],
         &["solve"],
-        &["model"],
-        &["compare"],
-        &["formats"],
-        &["order"],
+        &["thesis"],
+        &["thesis", "compare"],
+        &["thesis", "formats"],
+        &["thesis", "order"],
         &["list"],
         &["load"],
         &["check"],
@@ -49,12 +49,12 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         &["--grid", "0x1x1"],
         &["--window", "40000"],
         &["--grid", "180x1000x180"],
-        &["order", "--grid", "180x1000x180"],
+        &["thesis", "order", "--grid", "180x1000x180"],
         &["--steps", "5", "list"],
         &["--board", "abacus", "list"],
         &["solve"],
         &["solve", "/nonexistent"],
-        &["model", "--collisions", "1"],
+        &["thesis", "step", "--collisions", "1"],
         &["solve", folder, "--compare", "--contact-iterations", "3"],
         &[
             "solve",
@@ -152,7 +152,7 @@ fn falling_back_to_the_emulated_board_is_said_without_a_warning() {
     assert_eq!(board["kind"], "emulated");
     assert!(board["reason"].as_str().is_some_and(|why| why.starts_with("there is no UIO node")));
     // The results of other verbs do not name the board.
-    let order = ran("order --grid 2x2x2 --steps 1");
+    let order = ran("thesis order --grid 2x2x2 --steps 1");
     assert!(order.stderr.starts_with("board: emulated (there is no UIO node"), "{}", order.stderr);
     assert_eq!(order.stderr.lines().count(), 1, "{}", order.stderr);
 }
@@ -423,9 +423,9 @@ fn a_full_stdout_is_named_and_ends_with_2() {
         &["--version"],
         &["--grid", "2x2x2", "--steps", "2"],
         &["--grid", "2x2x2", "--steps", "2", "--json"],
-        &["compare", "float", "half", "--grid", "2x2x2", "--steps", "1"],
+        &["thesis", "compare", "float", "half", "--grid", "2x2x2", "--steps", "1"],
         &["list"],
-        &["model", "--collisions", "1", "--bodies", "2"],
+        &["thesis", "step", "--collisions", "1", "--bodies", "2"],
         &["check"],
         &["faults", "--list", "--profile", "naive"],
     ] {

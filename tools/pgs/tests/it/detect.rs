@@ -1,4 +1,4 @@
-//! `pgs detect`: times of the detection, and Bullet's collisions beside ours.
+//! `pgs thesis detection`: Bullet's collisions beside ours.
 
 use std::fs;
 use std::process::Command;
@@ -7,30 +7,38 @@ use serde_json::Value;
 
 use crate::common::{Ran, copy, golden, number, patch, pgs, run, text, variable, write};
 
-/// Runs `pgs detect --input FOLDER OPTIONS`.
+/// Runs `pgs thesis detection --input FOLDER OPTIONS`.
 fn detect(folder: &std::path::Path, options: &[&str]) -> Ran {
-    run([&["detect", "--input", text(folder)], options].concat())
+    run([&["thesis", "detection", "--input", text(folder)], options].concat())
+}
+
+/// The row of a table with this cell in its first column.
+fn row<'a>(document: &'a Value, table: usize, column: &str, begin: &str) -> &'a Value {
+    let rows = document["tables"][table]["rows"].as_array().expect("rows");
+    let starts = |row: &&Value| row[column].as_str().is_some_and(|cell| cell.starts_with(begin));
+    rows.iter().find(starts).unwrap_or_else(|| panic!("no {begin}: {document:#}"))
 }
 
 /// Asserts that our detection finds the folder's collisions, and that every difference has a cause.
-fn assert_agrees(folder: &std::path::Path) -> Value {
-    let ran = detect(folder, &["--compare", "--json", "--runs", "1"]);
+fn assert_agrees(folder: &std::path::Path) {
+    let ran = detect(folder, &["--json"]);
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
-    let document = ran.json();
-    let comparison = &document["comparison"];
-    assert_eq!(comparison["agrees"], true, "{document}");
-    // Stricter than the verb: we miss none of Bullet's collisions, and none of our extra ones is deep.
-    assert_eq!(comparison["missing"]["collisions"], 0, "{document}");
-    assert_eq!(comparison["extra"]["deep"], 0, "{document}");
-    for kind in ["normals_degrees", "points_m"] {
-        assert_eq!(comparison[kind]["unknown"]["number"], 0, "{document}");
+    let document = &ran.json();
+    // Stricter than the command: we miss none of Bullet's collisions, and none of our extra ones is
+    // deep.
+    let side = |name| row(document, 0, "side", name);
+    assert_eq!(side("missing")["collisions"], 0, "{document}");
+    assert_eq!(side("extra")["deep"], 0, "{document}");
+    for table in [1, 2] {
+        assert_eq!(row(document, table, "cause", "unknown")["number"], 0, "{document}");
     }
-    let deep = &comparison["normals_degrees"]["deep"];
+    let deep = row(document, 1, "cause", "all of pairs deeper");
     assert!(number(&deep["largest"]) < 0.01, "{document}");
-    let same = |kind: &str| number(&comparison[kind]["same"]["number"]);
-    assert!(same("normals_degrees") > 0.9 * number(&comparison["folder_collisions"]), "{document}");
-    assert!(same("points_m") > 0.6 * number(&comparison["our_points"]), "{document}");
-    document
+    let same = |table| number(&row(document, table, "cause", "same")["number"]);
+    assert!(same(1) > 0.9 * number(&side("the folder's")["collisions"]), "{document}");
+    let all = document["tables"][2]["rows"].as_array().expect("rows");
+    let points = all[..6].iter().fold(0.0, |sum, row| sum + number(&row["number"]));
+    assert!(same(2) > 0.6 * points, "{document}");
 }
 
 #[test]
@@ -48,33 +56,11 @@ fn the_piles_of_bullet_have_the_collisions_that_we_detect() {
     }
 }
 
-#[test]
-fn both_phases_print_their_times_from_nothing_and_with_everything_kept() {
-    let ran = detect(&golden("pile5_step62"), &[]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let lines: Vec<&str> =
-        ran.stdout.lines().filter(|line| line.starts_with("detection ")).collect();
-    assert!(lines.len() == 2 && lines[0].contains("from nothing"), "{}", ran.stdout);
-    assert!(lines.iter().all(|line| line.contains("broad phase") && line.contains("narrow phase")));
-    assert!(!ran.stdout.contains("missing"), "{}", ran.stdout);
-}
-
-#[test]
-fn a_scene_is_detected_without_a_folder() {
-    for options in ["--grid 4x3x4 --drop 0", "--scene shapes --grid 4x4x4 --threads 2"] {
-        let words = ["detect", "--json"].into_iter().chain(options.split(' '));
-        let ran = run(words);
-        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-        let document = ran.json();
-        // Nothing moves yet.
-        assert_eq!(document["first"]["pairs"], document["next"]["pairs"], "{document}");
-        assert_eq!(document["comparison"], Value::Null);
-    }
-    let document = run(["detect", "--json", "--grid", "4x3x4", "--drop", "0"]).json();
-    // 16 on the ground; a layer of 4 x 4 lies on the next in 7 x 7 pairs.
-    assert_eq!(document["ground_collisions"], 16);
-    assert_eq!(document["collisions"], 16 + 2 * 49);
-    assert_eq!(document["points"], 4 * (16 + 2 * 49));
+/// Asserts that one deep pair is on one side alone.
+fn assert_one(ran: &Ran, side: &str) {
+    let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let line = ran.stdout.lines().map(words).find(|words| words.first().is_some_and(|w| w == side));
+    assert_eq!(line.expect("a row")[1..3], ["1", "1"], "{}", ran.stdout);
 }
 
 #[test]
@@ -82,19 +68,17 @@ fn a_missing_and_an_extra_pair_are_differences() {
     // The first cube lifted off the ground: Bullet's pair is missing.
     let folder = copy("one_cube");
     patch(&folder, "body_pos.npy", 4, 1.5_f32.to_le_bytes());
-    let ran = detect(folder.path(), &["--compare"]);
+    let ran = detect(folder.path(), &[]);
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
-    assert!(ran.stdout.contains("missing    1, 1 of them deeper"), "{}", ran.stdout);
+    assert_one(&ran, "missing");
     // The second cube pressed into the ground beside the first one.
     let folder = copy("two_cubes");
     for (index, value) in [(6, 9.0_f32), (7, 0.9)] {
         patch(&folder, "body_pos.npy", index, value.to_le_bytes());
     }
-    let ran = detect(folder.path(), &["--compare"]);
+    let ran = detect(folder.path(), &[]);
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
-    assert!(ran.stdout.contains("extra      1, 1 of them deeper"), "{}", ran.stdout);
-    // Without a comparison there is nothing to differ.
-    assert_eq!(detect(folder.path(), &[]).code, Some(0));
+    assert_one(&ran, "extra");
 }
 
 #[test]
@@ -102,7 +86,7 @@ fn folders_that_cannot_be_compared_are_refused_with_the_reason() {
     let refused = |name: &str, change: &dyn Fn(&tempfile::TempDir), parts: &[&str]| {
         let folder = copy(name);
         change(&folder);
-        let ran = detect(folder.path(), &["--compare"]);
+        let ran = detect(folder.path(), &[]);
         assert_eq!(ran.code, Some(2), "{}{}", ran.stdout, ran.stderr);
         for part in parts {
             assert!(ran.stderr.contains(part), "no {part:?}: {}", ran.stderr);
@@ -122,7 +106,7 @@ fn folders_that_cannot_be_compared_are_refused_with_the_reason() {
     refused(
         "two_cubes",
         &|folder| patch(folder, "body_pos.npy", 4, bits(f32::NAN)),
-        &["body 1", "a finite position", "NaN", "pgs detect --help"],
+        &["body 1", "a finite position", "NaN", "pgs thesis detection --help"],
     );
     refused(
         "two_cubes",
@@ -176,20 +160,12 @@ fn folders_that_cannot_be_compared_are_refused_with_the_reason() {
 
 #[test]
 fn wrong_usage_is_refused() {
-    for (options, part) in [
-        (&["--compare"][..], "--input"),
-        (&["--input", "x", "--grid", "3x3x3"], "--grid"),
-        (&["--broad-phase", "sweep"], "--broad-phase"),
-        (&["--grid", "180x1000x180"], "give a smaller --grid"),
-        (&["--accelerator", "model"], "--accelerator"),
-    ] {
-        let ran = run([&["detect"], options].concat());
+    for (options, part) in [(&[][..], "--input"), (&["--input", "x", "--grid", "3x3x3"], "--grid")]
+    {
+        let ran = run([&["thesis", "detection"], options].concat());
         assert_eq!(ran.code, Some(2), "{options:?}: {}", ran.stdout);
         assert!(ran.stderr.contains(part), "{options:?}: {}", ran.stderr);
     }
-    let help = run(["detect", "--help"]);
-    assert_eq!(help.code, Some(0));
-    assert!(help.stdout.contains("pgs detect --input tests/golden/pile5_step60 --compare"));
 }
 
 /// Without the refusal the program aborts at the allocation that finds no memory.
@@ -197,9 +173,9 @@ fn wrong_usage_is_refused() {
 fn a_grid_that_finds_no_memory_ends_in_a_sentence() {
     let command = pgs();
     let mut shell = Command::new("sh");
-    shell.args(["-c", "ulimit -v 500000; exec \"$0\" \"$@\""]);
+    shell.args(["-c", "ulimit -v 250000; exec \"$0\" \"$@\""]);
     shell.arg(command.get_program()).args(command.get_args());
-    let ran: Ran = shell.args(["detect", "--grid", "60x100x60"]).output().expect("a shell").into();
+    let ran: Ran = shell.args(["run", "--grid", "50x50x50"]).output().expect("a shell").into();
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
-    assert!(ran.stderr.contains("60x100x60 takes about 921600000 bytes"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("50x50x50 takes about 320000000 bytes"), "{}", ran.stderr);
 }

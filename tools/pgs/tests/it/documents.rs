@@ -102,7 +102,7 @@ fn the_commands_of_the_documents_print_what_these_show() {
         ("README.md", "solve"),
         ("docs/board.md", "check"),
         ("docs/faults.md", "solve"),
-        ("docs/performance.md", "model"),
+        ("docs/performance.md", "thesis"),
     ];
     assert_eq!(verbs, expected, "a new transcript is tested by being named here");
     for Transcript { document, arguments, shown } in transcripts {
@@ -262,12 +262,13 @@ fn the_table_of_bitstreams_holds_what_its_commands_measure() {
     let page = text("docs/profiles.md");
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        words.contains("`pgs compare float half --grid 12x10x12 --drop 5 --steps 120`"),
+        words.contains("`pgs thesis compare float half --grid 12x10x12 --drop 5 --steps 120`"),
         "the command"
     );
     assert!(words.contains("ends with seven times the kinetic energy"), "what it ends with");
     let last = |profile: &str| {
-        let command = format!("compare float {profile} --grid 12x10x12 --drop 5 --steps 120");
+        let command =
+            format!("thesis compare float {profile} --grid 12x10x12 --drop 5 --steps 120");
         let ran = run(command.split(' ').chain(["--json"]));
         assert_eq!(ran.code, Some(0), "{command}: {}", ran.stderr);
         let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");

@@ -53,7 +53,7 @@ fn memory_of_real_boards_in_the_environment_is_nothing_to_an_emulated_one() {
     let ran = solve(&[("PGS_MEMORY", "uio:pgs-memory")], &["--board", "emulated"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""));
     let mut compare = pgs();
-    compare.args(["compare", "float", "half", "--grid", "2x2x2", "--steps", "1"]);
+    compare.args(["thesis", "compare", "float", "half", "--grid", "2x2x2", "--steps", "1"]);
     let ran = Ran::from(compare.env("PGS_MEMORY", "uio").output().expect("it starts"));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
 }

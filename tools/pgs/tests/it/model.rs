@@ -1,16 +1,16 @@
-//! `pgs model` shows every table of the thesis beside ours, as text, Markdown and JSON.
+//! The formulas of `pgs thesis` show every table of the thesis beside ours, as text, Markdown and JSON.
 
 use std::collections::BTreeSet;
 
 use crate::common::{Ran, near, run};
 use serde_json::{Value, json};
 
-fn model(arguments: &[&str]) -> Ran {
-    run(["model"].iter().chain(arguments))
+fn thesis(arguments: &[&str]) -> Ran {
+    run(["thesis"].iter().chain(arguments))
 }
 
 fn document(arguments: &[&str]) -> Value {
-    let ran = model(&[arguments, &["--json"]].concat());
+    let ran = thesis(&[arguments, &["--json"]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     ran.json()
 }
@@ -35,7 +35,7 @@ fn keys(value: &Value) -> BTreeSet<&str> {
 
 #[test]
 fn the_totals_of_tables_4_1_to_4_6_are_exact() {
-    let document = document(&["--section", "data"]);
+    let document = document(&["data"]);
     for (id, totals) in [
         ("T4.1", &[(7_423_040, 1_855_760, 28.32), (3_662_280, 915_570, 13.97)][..]),
         ("T4.2", &[(311_040, 77_760, 1.19), (233_280, 58_320, 0.89)]),
@@ -81,7 +81,7 @@ fn the_totals_of_tables_4_1_to_4_6_are_exact() {
 
 #[test]
 fn cycles_meet_tables_6_4_and_6_8_within_0_6_percent() {
-    let document = document(&["--section", "step"]);
+    let document = document(&["step"]);
     let total = |profile, records| {
         let row = row(&document, "cycles", &[("profile", profile), ("records", records)]);
         (row["total"].as_u64(), row["thesis"].as_u64(), &row["difference_percent"])
@@ -111,7 +111,7 @@ fn cycles_meet_tables_6_4_and_6_8_within_0_6_percent() {
 
 #[test]
 fn on_chip_memory_is_that_of_section_4_4_2() {
-    let document = document(&["--section", "memory"]);
+    let document = document(&["memory"]);
     for (profile, mib, with_positions) in [("float", 2.83, 3.27), ("half", 1.86, 2.30)] {
         let row = row(&document, "memory", &[("profile", profile)]);
         near(&row["mib"], mib, 0.005);
@@ -146,7 +146,7 @@ fn on_chip_memory_is_that_of_section_4_4_2() {
 
 #[test]
 fn every_interval_is_justified_by_ports_and_streams() {
-    let document = document(&["--section", "ports"]);
+    let document = document(&["ports"]);
     for (profile, ports, streams, claimed) in
         [("naive", 2, 28, 28), ("float", 2, 2, 2), ("half", 3, 3, 3), ("mixed", 1, 1, 1)]
     {
@@ -181,7 +181,7 @@ fn every_interval_is_justified_by_ports_and_streams() {
 
 #[test]
 fn mixed_moves_at_most_half_of_floats_bytes() {
-    let document = document(&["--section", "mixed"]);
+    let document = document(&["mixed"]);
     let figure = |name| row(&document, "mixed", &[("figure", name)]);
     near(&figure("cycles at unlimited")["mixed"], 1_096_704.0, 0.5);
     near(&figure("cycles at 12.8 GB/s")["mixed"], 1_117_764.0, 0.5);
@@ -194,7 +194,7 @@ fn mixed_moves_at_most_half_of_floats_bytes() {
 
 #[test]
 fn the_comparison_has_what_the_thesis_prints() {
-    let document = document(&["--section", "comparison,euler"]);
+    let document = document(&["comparison"]);
     // The thermal design powers are 165 and 77 W; the thesis divides by 288 and 133 W.
     for (profile, figures, at_design_power) in [
         (
@@ -228,6 +228,7 @@ fn the_comparison_has_what_the_thesis_prints() {
     let power = row(&document, "comparison", &with);
     assert_eq!((&power["kind"], &power["packed_unlimited"]), (&json!("recorded"), &Value::Null));
     near(&power["recomputed"], 133.0 / 15.0, 1e-9);
+    let document = self::document(&["euler"]);
     let falls = table(&document, "euler")["rows"].as_array().expect("rows");
     let metres: Vec<_> = falls.iter().map(|row| row["metres"].as_f64().expect("m")).collect();
     for (found, expected) in metres.iter().zip([450.0, 499.5, 499.497, 500.0]) {
@@ -235,127 +236,90 @@ fn the_comparison_has_what_the_thesis_prints() {
     }
 }
 
+/// The experiments that only calculate, and the ids of their tables.
+const FORMULAS: [(&str, &[&str]); 10] = [
+    ("step", &["cycles", "time", "inertia"]),
+    ("mixed", &["mixed"]),
+    ("windowed", &["window_cycles", "window_gains", "window_logic"]),
+    ("data", &["T4.1", "T4.2", "T4.3", "T4.4", "T4.5", "T4.6", "records"]),
+    ("memory", &["memory", "arrays", "blocks", "logic"]),
+    ("streams", &["streams"]),
+    ("ports", &["ports", "interval", "schedule", "copies", "load"]),
+    ("warm", &["warm"]),
+    ("comparison", &["platforms", "comparison"]),
+    ("euler", &["euler"]),
+];
+
 #[test]
 fn the_json_keys_are_stable() {
-    let document = document(&[]);
-    assert_eq!(document["schema"], 2);
-    let expected = BTreeSet::from([
-        "schema",
-        "verb",
-        "bodies",
-        "collisions",
-        "contact_iterations",
-        "friction_iterations",
-        "thesis_step",
-        "world_inertia",
-        "profiles",
-        "tables",
-    ]);
-    assert_eq!(keys(&document), expected);
-    let profiles = document["profiles"].as_array().expect("profiles");
-    let names: Vec<_> = profiles.iter().map(|profile| &profile["profile"]).collect();
-    assert_eq!(names, ["naive", "float", "half", "mixed", "windowed", "windowed16"]);
-    let float = &profiles[1];
-    let expected = BTreeSet::from([
-        "profile",
-        "clock_khz",
-        "thesis_words",
-        "streamed_words",
-        "thesis",
-        "memory",
-        "initiation_interval",
-        "stream_bytes_per_second",
-    ]);
-    assert_eq!(keys(float), expected);
-    assert_eq!(float["thesis_words"]["cycles"]["total"], 2_066_606);
-    assert_eq!(float["streamed_words"]["cycles"]["total"], 2_093_336);
-    assert_eq!(float["memory"]["block_ram"], 2_965_120);
-    assert_eq!(float["thesis_words"]["times"].as_array().map(Vec::len), Some(4));
-    assert_eq!(float["thesis"]["cycles"], 2_062_697);
-    let ids: Vec<_> = document["tables"]
-        .as_array()
-        .expect("tables")
-        .iter()
-        .map(|table| table["id"].as_str().expect("an id"))
-        .collect();
-    assert_eq!(
-        ids,
-        [
-            "cycles",
-            "time",
-            "inertia",
-            "mixed",
-            "window_cycles",
-            "window_gains",
-            "window_logic",
-            "T4.1",
-            "T4.2",
-            "T4.3",
-            "T4.4",
-            "T4.5",
-            "T4.6",
-            "records",
-            "memory",
-            "arrays",
-            "blocks",
-            "logic",
-            "streams",
-            "ports",
-            "interval",
-            "schedule",
-            "copies",
-            "load",
-            "warm",
-            "platforms",
-            "comparison",
-            "euler",
-        ]
-    );
-    for table in document["tables"].as_array().expect("tables") {
-        let columns: BTreeSet<_> = table["columns"]
-            .as_array()
-            .expect("columns")
-            .iter()
-            .filter_map(Value::as_str)
-            .collect();
-        for row in table["rows"].as_array().expect("rows") {
-            assert_eq!(keys(row), columns, "{}", table["id"]);
-            let kind = &row["kind"];
-            let known =
-                ["exact", "modelled", "recorded", "open"].iter().any(|known| kind == *known);
-            assert!(known, "{row}");
+    for (name, ids) in FORMULAS {
+        let document = document(&[name]);
+        assert_eq!((&document["schema"], &document["experiment"]), (&json!(3), &json!(name)));
+        let expected = BTreeSet::from([
+            "schema",
+            "verb",
+            "experiment",
+            "thesis",
+            "complete",
+            "bodies",
+            "collisions",
+            "contact_iterations",
+            "friction_iterations",
+            "thesis_step",
+            "world_inertia",
+            "tables",
+            "figures",
+            "index",
+        ]);
+        assert_eq!(keys(&document), expected);
+        let tables = document["tables"].as_array().expect("tables");
+        let found: Vec<_> = tables.iter().map(|table| &table["id"]).collect();
+        assert_eq!(found, *ids);
+        for table in tables {
+            let columns: BTreeSet<_> = table["columns"]
+                .as_array()
+                .expect("columns")
+                .iter()
+                .filter_map(Value::as_str)
+                .collect();
+            for row in table["rows"].as_array().expect("rows") {
+                assert_eq!(keys(row), columns, "{}", table["id"]);
+                let kind = &row["kind"];
+                let known =
+                    ["exact", "modelled", "recorded", "open"].iter().any(|known| kind == *known);
+                assert!(known, "{row}");
+            }
         }
     }
 }
 
 #[test]
 fn another_step_is_not_held_against_the_thesis() {
-    let document = document(&["--bodies", "1000", "--collisions", "3001"]);
+    let step = ["--bodies", "1000", "--collisions", "3001"];
+    let cycles = document(&[&["step"], &step[..]].concat());
+    let document = document(&[&["data"], &step[..]].concat());
     assert_eq!(document["thesis_step"], false);
-    assert!(
-        document["profiles"].as_array().expect("profiles").iter().all(|p| p["thesis"].is_null())
-    );
     let after = row(&document, "T4.1", &[("state", "after")]);
     assert_eq!(after["words"], 27 * 3001 + 6 * 1000);
     for of in ["difference_percent", "mib_difference_percent", "beats_difference_percent"] {
         assert_eq!(after[of], Value::Null);
     }
-    let half = row(&document, "cycles", &[("profile", "half"), ("records", "streamed")]);
+    let half = row(&cycles, "cycles", &[("profile", "half"), ("records", "streamed")]);
     assert_eq!((&half["pass"], &half["difference_percent"]), (&json!(1501 * 3), &Value::Null));
 }
 
 #[test]
 fn world_inertia_costs_cycles_and_memory() {
-    let document = document(&["--profile", "float", "--world-inertia"]);
-    assert_eq!(document["profiles"].as_array().map(Vec::len), Some(1));
-    let float = &document["profiles"][0];
-    assert_eq!(float["streamed_words"]["cycles"]["load"], 38_880);
-    assert_eq!(float["memory"]["world_inertia"], 24 * 38_880);
+    let options = ["--profile", "float", "--world-inertia"];
+    let document = document(&[&["step"], &options[..]].concat());
+    let streamed = row(&document, "cycles", &[("profile", "float"), ("records", "streamed")]);
+    assert_eq!(streamed["load"], 38_880);
     let cost = row(&document, "inertia", &[("profile", "float")]);
     assert_eq!(
         (&cost["cycles_without"], &cost["cycles_with"]),
         (&json!(2_093_336), &json!(2_112_888))
     );
+    let document = self::document(&[&["ports"], &options[..]].concat());
     let inertia = row(&document, "ports", &[("array", "world inertia")]);
     assert_eq!(inertia["interval"], 1);
 }
@@ -363,7 +327,7 @@ fn world_inertia_costs_cycles_and_memory() {
 /// O4: bytes at most a sixth and an eleventh of float's, MiB on chip; nothing is measured.
 #[test]
 fn the_designs_that_stream_once_move_and_hold_what_they_must() {
-    let document = document(&["--profile", "windowed16", "--section", "windowed"]);
+    let document = document(&["windowed", "--profile", "windowed16"]);
     let gains = row(&document, "window_gains", &[("profile", "windowed16")]);
     let number = |key: &str| gains[key].as_f64().expect("a number");
     assert!(11.0 * number("bytes") <= number("float_bytes"));
@@ -374,7 +338,7 @@ fn the_designs_that_stream_once_move_and_hold_what_they_must() {
     assert_eq!((&cycles["load"], &cycles["integration"]), (&json!(38_880), &json!(77_760)));
     let logic = row(&document, "window_logic", &[("profile", "windowed16")]);
     assert_eq!((&logic["dsp"], &logic["lookup_tables"]), (&json!(84.0), &json!(98.0)));
-    let document = self::document(&["--profile", "windowed", "--section", "windowed"]);
+    let document = self::document(&["windowed", "--profile", "windowed"]);
     let gains = row(&document, "window_gains", &[("profile", "windowed")]);
     let number = |key: &str| gains[key].as_f64().expect("a number");
     assert!(6.0 * number("bytes") <= number("float_bytes") && number("mib") <= 2.2);
@@ -382,53 +346,57 @@ fn the_designs_that_stream_once_move_and_hold_what_they_must() {
 
 #[test]
 fn the_text_is_aligned_and_fits_a_wide_terminal() {
-    let ran = model(&[]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let words = ran.stdout.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
-    let float = ["float", "packed", "14,580", "254,000", "2,752"];
-    assert!(words.into_iter().any(|words| words.starts_with(&float)), "{}", ran.stdout);
-    for line in ran.stdout.lines() {
-        assert!(line.chars().count() <= 140, "{line}");
-        assert_eq!(line, line.trim_end());
+    for (name, _) in FORMULAS {
+        let ran = thesis(&[name]);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        for line in ran.stdout.lines() {
+            assert!(line.chars().count() <= 140, "{line}");
+            assert_eq!(line, line.trim_end());
+        }
     }
+    let text = thesis(&["step"]).stdout;
+    let mut words = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let float = ["float", "packed", "14,580", "254,000", "2,752"];
+    assert!(words.any(|words| words.starts_with(&float)), "{text}");
 }
 
 #[test]
 fn markdown_has_every_table_with_a_rule_and_rows_of_its_width() {
-    let ran = model(&["--markdown"]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let lines: Vec<&str> = ran.stdout.lines().collect();
-    let headings = lines.iter().filter(|line| line.starts_with("### ")).count();
-    assert_eq!(headings, 28);
-    let cells = |line: &str| line.matches('|').count();
-    let mut tables = 0;
-    for (k, line) in lines.iter().enumerate() {
-        if line.starts_with("| :--") {
-            tables += 1;
-            assert_eq!(cells(line), cells(lines[k - 1]), "{line}");
-            assert_eq!(lines[k - 2], "", "a blank line before the table");
-            for row in lines[k + 1..].iter().take_while(|row| row.starts_with('|')) {
-                assert_eq!(cells(row), cells(line), "{row}");
+    for (name, ids) in FORMULAS {
+        let ran = thesis(&[name, "--markdown"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let lines: Vec<&str> = ran.stdout.lines().collect();
+        let cells = |line: &str| line.matches('|').count();
+        let mut tables = 0;
+        for (k, line) in lines.iter().enumerate() {
+            if line.starts_with("| :--") {
+                tables += 1;
+                assert_eq!(cells(line), cells(lines[k - 1]), "{line}");
+                assert_eq!(lines[k - 2], "", "a blank line before the table");
+                for row in lines[k + 1..].iter().take_while(|row| row.starts_with('|')) {
+                    assert_eq!(cells(row), cells(line), "{row}");
+                }
             }
         }
+        assert_eq!(tables, ids.len(), "{name}");
     }
-    assert_eq!(tables, headings);
 }
 
 #[test]
 fn the_largest_numbers_are_taken() {
     let most = u32::MAX.to_string();
-    let ran = model(&["--collisions", &most, "--bodies", &most]);
-    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    assert!(ran.stdout.contains("does not fit"), "{}", ran.stdout);
-    let nothing = model(&["--collisions", "0", "--bodies", "0"]);
-    assert_eq!(nothing.code, Some(0), "{}", nothing.stderr);
-    assert!(!nothing.stdout.contains("NaN") && !nothing.stdout.contains("inf "));
+    for (name, _) in FORMULAS {
+        for count in [&most, "0"] {
+            let ran = thesis(&[name, "--collisions", count, "--bodies", count]);
+            assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+            assert!(!ran.stdout.contains("NaN") && !ran.stdout.contains("inf "), "{}", ran.stdout);
+        }
+    }
 }
 
 #[test]
 fn a_warm_start_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes_at_most() {
-    let document = document(&["--section", "warm"]);
+    let document = document(&["warm"]);
     let of = |way| row(&document, "warm", &[("profile", "float"), ("applied", way)]);
     let chosen = of("in a pass in front of each kind");
     near(&chosen["more_cycles_percent"], 24.3, 0.1);
@@ -447,18 +415,32 @@ fn a_warm_start_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes_at_most()
 #[test]
 fn what_excludes_each_other_is_refused_with_2() {
     for (arguments, said) in [
-        (&["--json", "--markdown"][..], "exclude each other"),
-        (&["--section", "mixed", "--profile", "half"], "--profile mixed"),
-        (&["--section", "windowed", "--profile", "mixed"], "--profile windowed or windowed16"),
-        (&["--section", "warm", "--profile", "windowed"], "--profile naive, float, half or mixed"),
-        (&["--profile", "quarter"], "naive, float, half, mixed, windowed, windowed16, all"),
-        (&["--section", "tables"], "possible values"),
-        (&["--bodies", "5"], "--collisions"),
-        (&["--bandwidth", "0"], "GB/s"),
+        (&["step", "--json", "--markdown"][..], "exclude each other"),
+        (&["mixed", "--profile", "half"], "nothing about half"),
+        (&["windowed", "--profile", "mixed"], "another --profile"),
+        (&["warm", "--profile", "windowed"], "nothing about windowed"),
+        (&["step", "--profile", "quarter"], "naive, float, half, mixed, windowed, windowed16, all"),
+        (&["tables"], "tables"),
+        (&["step", "--bodies", "5"], "--collisions"),
+        (&["step", "--bandwidth", "0"], "GB/s"),
+        (&["--all"], "--out"),
     ] {
-        let ran = model(arguments);
+        let ran = thesis(arguments);
         assert_eq!(ran.code, Some(2), "{arguments:?}");
         assert!(ran.stderr.contains(said), "{arguments:?}: {}", ran.stderr);
         assert!(ran.stdout.is_empty(), "{arguments:?}");
     }
+}
+
+#[test]
+fn without_a_name_the_experiments_are_listed_in_the_order_of_the_thesis() {
+    let text = thesis(&[]).stdout;
+    let place = |name: &str| {
+        let begins = |line: &str| line.split_whitespace().next() == Some(name);
+        text.lines().position(begins).unwrap_or_else(|| panic!("no {name}: {text}"))
+    };
+    assert!(place("time-step") < place("data") && place("data") < place("ladder"), "{text}");
+    assert!(place("ladder") < place("comparison"), "{text}");
+    let rows = document(&[])["tables"][0]["rows"].as_array().map(Vec::len);
+    assert_eq!(rows, Some(text.lines().count() - 2), "{text}");
 }

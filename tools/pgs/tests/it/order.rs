@@ -1,4 +1,4 @@
-//! `pgs order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
+//! `pgs thesis order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
 //! scene, whose figures were measured outside this project.
 
 use std::path::PathBuf;
@@ -7,16 +7,16 @@ use crate::common;
 use crate::common::{golden, number, run, skipped, text, variable};
 use serde_json::Value;
 
-/// Runs `pgs order --json`; returns its document.
+/// Runs `pgs thesis order --json`; returns its document.
 fn order(arguments: &[&str]) -> Value {
-    let ran = run([&["order", "--json", "--runs", "1"], arguments].concat());
+    let ran = run([&["thesis", "order", "--json", "--runs", "1"], arguments].concat());
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}{}", ran.stdout, ran.stderr);
     ran.json()
 }
 
 /// The row of an order at a depth.
 fn row<'a>(document: &'a Value, order: &str, depth: u64) -> &'a Value {
-    let rows = document["rows"].as_array().expect("a list");
+    let rows = document["tables"][0]["rows"].as_array().expect("a list");
     let found = rows.iter().find(|row| row["order"] == order && row["depth"] == depth);
     found.unwrap_or_else(|| panic!("no row {order} {depth} in {document:#}"))
 }
@@ -35,7 +35,7 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
     ];
     for arguments in scenes {
         let document = order(arguments);
-        let rows = document["rows"].as_array().expect("a list");
+        let rows = document["tables"][0]["rows"].as_array().expect("a list");
         // As given, random, three of the thesis, colours, two of ours.
         assert_eq!(rows.len(), 4 * 8, "{arguments:?}");
         for depth in [1, 4, 16, 192] {
@@ -51,42 +51,25 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
 }
 
 #[test]
-fn curves_are_written_by_extension() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let curve = |name: &str| {
-        let path = folder.path().join(name);
-        order(&["--spheres", "100", "--depth", "4,8", "--curve", text(&path)]);
-        std::fs::read_to_string(path).expect("the file")
-    };
-    let table = curve("live.csv");
-    assert!(table.starts_with("slot,as given,random,thesis lowest index,"), "{table}");
-    assert!(table.lines().count() > 100);
-    let picture = curve("live.svg");
-    assert!(picture.starts_with("<svg ") && picture.ends_with("</svg>\n"));
-    assert_eq!(picture.matches("<polyline").count(), 8);
-}
-
-#[test]
 fn what_cannot_be_ordered_is_refused() {
     let folder = golden("pile5_step60");
     for arguments in [
         &["--depth", "0"][..],
         &["--depth", "16385"],
         &["--per-issue", "0"],
-        &["--curve", "live.png"],
         &["--spheres", "0"],
         &["--seed", "1"],
         &["--input", text(&folder), "--spheres", "10"],
         &["--input", "nowhere"],
         &["--grid", "2x2x2", "--drop", "-1"],
     ] {
-        let ran = run([&["order"], arguments].concat());
+        let ran = run([&["thesis", "order"], arguments].concat());
         assert_eq!(ran.code, Some(2), "{arguments:?}: {}", ran.stderr);
         assert!(ran.stdout.is_empty() && ran.stderr.contains("error:"), "{arguments:?}");
     }
     let broken = common::copy("pile5_step60");
     common::patch(&broken, "contact_bodies.npy", 5, 126_u32.to_le_bytes());
-    let ran = run(["order", "--input", text(broken.path())]);
+    let ran = run(["thesis", "order", "--input", text(broken.path())]);
     assert_eq!(ran.code, Some(2));
     assert!(ran.stderr.contains("collision 2 names body 126, there are 126"), "{}", ran.stderr);
 }
@@ -100,7 +83,7 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     assert_eq!(row(&document, "Bullet's GPU batches", 2)["hazards"], 1);
     for wrong in [1, 2_u32] {
         write(&[wrong.to_le_bytes(), 1_u32.to_le_bytes()]);
-        let ran = run(["order", "--input", text(folder.path())]);
+        let ran = run(["thesis", "order", "--input", text(folder.path())]);
         assert_eq!(ran.code, Some(2));
         assert!(ran.stderr.contains("each index below 2 once"), "{}", ran.stderr);
     }
@@ -150,8 +133,7 @@ fn full_step() -> Option<PathBuf> {
 fn the_full_step_has_the_hazards_and_live_bodies_that_others_measured() {
     let Some(folder) = full_step() else { return };
     let document = order(&["--input", text(&folder)]);
-    let percent =
-        |order: &str, depth| number(&row(&document, order, depth)["hazard_share"]) * 100.0;
+    let percent = |order: &str, depth| number(&row(&document, order, depth)["hazard_percent"]);
     let alive = |order: &str| number(&row(&document, order, 64)["most_alive"]);
     for (order, shares, most) in [
         ("as given", [71.0, 71.8, 80.0], 2_173.0),
@@ -186,7 +168,7 @@ fn the_full_step_is_ordered_without_hazards_and_with_few_bodies_alive() {
     for (depth, empty) in [(16, 0.3), (32, 0.3), (64, 0.3), (96, 0.3), (128, 0.5), (192, 0.7)] {
         let ours = row(&document, "hazard-free", depth);
         assert_eq!(ours["hazards"], 0, "{depth}");
-        assert!(number(&ours["empty_share"]) * 100.0 <= empty, "{depth}: {ours:#}");
+        assert!(number(&ours["empty_percent"]) <= empty, "{depth}: {ours:#}");
         assert!(number(&ours["most_alive"]) <= 800.0, "{depth}: {ours:#}");
         assert!(number(&ours["longest_span"]) <= 3_300.0, "{depth}: {ours:#}");
     }

@@ -1,4 +1,4 @@
-//! `pgs study` about the time step, stopping rules, the shares of a step and the ladder of designs:
+//! Experiments of `pgs thesis` about the time step, stopping rules, the shares of a step and the ladder of designs:
 //! figures that a reader can compute by hand, and refusals.
 
 use crate::common::{golden, near, number, run, text};
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// Runs a study; returns its document.
 fn study(arguments: &[&str]) -> Value {
-    let ran = run([&["study"], arguments, &["--json"]].concat());
+    let ran = run([&["thesis"], arguments, &["--json"]].concat());
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.stderr);
     assert!(ran.stderr.is_empty(), "{}", ran.stderr);
     ran.json()
@@ -118,13 +118,12 @@ fn the_ladder_ends_with_the_two_designs_that_the_thesis_measured() {
 #[test]
 fn a_study_without_an_answer_is_refused() {
     for arguments in [
-        &["study"][..],
-        &["study", "speed"],
-        &["study", "stopping", "--passes", "1"],
-        &["study", "stopping", "--input", "x", "--steps", "3"],
-        &["study", "time-step", "--seconds", "0"],
-        &["study", "split", "--runs", "0"],
-        &["study", "ladder", "--collisions", "0"],
+        &["thesis", "speed"][..],
+        &["thesis", "stopping", "--passes", "1"],
+        &["thesis", "stopping", "--input", "x", "--steps", "3"],
+        &["thesis", "time-step", "--seconds", "0"],
+        &["thesis", "split", "--runs", "0"],
+        &["thesis", "ladder", "--collisions", "0"],
     ] {
         assert_eq!(run(arguments).code, Some(2), "{arguments:?}");
     }

@@ -36,12 +36,12 @@ fn every_command_does_with_fewer_threads() {
     }
     let cube = golden("one_cube").display().to_string();
     for arguments in [
-        &["compare", "float", "half", "--grid", "4x4x4", "--steps", "2"][..],
-        &["compare", "float", "half", "--input", &cube],
+        &["thesis", "compare", "float", "half", "--grid", "4x4x4", "--steps", "2"][..],
+        &["thesis", "compare", "float", "half", "--input", &cube],
         &["run", "--grid", "4x4x4", "--steps", "2"],
         &["solve", &cube, "--digest"],
-        &["formats", "--grid", "3x3x3", "--step", "2"],
-        &["order", "--input", &cube],
+        &["thesis", "formats", "--grid", "3x3x3", "--step", "2"],
+        &["thesis", "order", "--input", &cube],
         &["check"],
         &["faults", "--profile", "naive", "--json"],
     ] {
@@ -51,7 +51,7 @@ fn every_command_does_with_fewer_threads() {
         let usual = run(arguments);
         assert_eq!(alone.code, usual.code, "{arguments:?}: {}", alone.stderr);
         assert!(!alone.stderr.contains("panicked"), "{arguments:?}: {}", alone.stderr);
-        if arguments[0] == "compare" {
+        if arguments.starts_with(&["thesis", "compare"]) {
             assert_eq!(alone.stdout, usual.stdout, "{arguments:?}");
             let mut loud = limited(&command);
             let ran: Ran = loud.env("RUST_LOG", "warn").output().expect("it starts").into();

@@ -10,12 +10,12 @@ use serde_json::json;
 use super::cells::{self, Cell};
 use super::trial::{Bench, CellResult};
 use super::{FaultsArgs, list, try_all};
-use crate::board;
-use crate::common::CommonArgs;
-use crate::failure::{Failure, Verdict};
-use crate::numbers::grouped;
-use crate::output::SCHEMA;
-use crate::output::table::{Column, heading, line};
+use pgs_command::board;
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::numbers::grouped;
+use pgs_command::output::SCHEMA;
+use pgs_command::output::table::{Column, heading, line};
 
 const COLUMNS: [Column; 6] = [
     Column { name: "fault", unit: "", width: 14 },

@@ -20,11 +20,11 @@ use serde_json::{Value, json};
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
-use crate::common::{AcceleratorChoice, CommonArgs};
-use crate::environment;
-use crate::failure::{Failure, Verdict};
-use crate::output::SCHEMA;
-use crate::output::progress::progress_bar;
+use pgs_command::common::{AcceleratorChoice, CommonArgs};
+use pgs_command::environment;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::output::SCHEMA;
+use pgs_command::output::progress::progress_bar;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -49,7 +49,7 @@ A cell is one fault at one place. It passes if the fault happened, and
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
     /// Try this profile only.
-    #[arg(long, value_name = "PROFILE", value_parser = crate::options::build::profile())]
+    #[arg(long, value_name = "PROFILE", value_parser = pgs_command::options::build::profile())]
     profile: Option<&'static Profile>,
     /// Print the fault of each cell, and try none.
     #[arg(long)]

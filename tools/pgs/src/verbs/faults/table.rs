@@ -8,8 +8,8 @@ use super::ProfileResults;
 use super::cells::Cell;
 use super::expected::Expected;
 use super::trial::CellResult;
-use crate::numbers::grouped;
-use crate::output::table::{Column, heading, line};
+use pgs_command::numbers::grouped;
+use pgs_command::output::table::{Column, heading, line};
 
 const COLUMNS: [Column; 9] = [
     Column { name: "fault", unit: "", width: 18 },

@@ -14,10 +14,10 @@ use zynq_pgs::{
 
 use super::cells::Cell;
 use super::expected::Expected;
-use crate::board;
-use crate::common::AcceleratorChoice;
-use crate::failure::Failure;
-use crate::options::scenes::CONTACT_REACH;
+use pgs_command::board;
+use pgs_command::common::AcceleratorChoice;
+use pgs_command::failure::Failure;
+use pgs_command::options::scenes::CONTACT_REACH;
 
 /// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for a
 /// millisecond; for reading all registers after a timeout; and for the reset of all parts.

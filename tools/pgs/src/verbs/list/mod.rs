@@ -11,11 +11,11 @@ use zynq_pgs::platform::{
     System, UioListing, fpga_managers, require_bitstream, u_dma_buf_names, uio_listing,
 };
 
-use crate::board;
-use crate::common::CommonArgs;
-use crate::failure::{Failure, Verdict};
-use crate::output::SCHEMA;
 use inventory::{Buffer, Node, explained, state, unreadable_json};
+use pgs_command::board;
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::output::SCHEMA;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -7,8 +7,8 @@ use zynq_pgs::{Accelerator, StepParameters};
 
 use super::row::{Row, step};
 use super::summary::FinalState;
-use crate::output::table::Column;
-use crate::permutation::Arranger;
+use pgs_command::output::table::Column;
+use pgs_command::permutation::Arranger;
 
 /// The columns that the scene adds to the table of the run.
 pub(super) const COLUMNS: [Column; 2] = [

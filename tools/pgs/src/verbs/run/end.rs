@@ -8,13 +8,13 @@ use zynq_pgs::StepParameters;
 
 use super::summary::{BoardFacts, Summary};
 use super::{Course, RunArgs, is_emulated};
-use crate::board::OpenBoard;
-use crate::numbers::grouped;
-use crate::options::bandwidth::bandwidth_text;
-use crate::options::solver::time_step_text;
-use crate::output::SCHEMA;
-use crate::output::facts::fact;
-use crate::permutation::Permutation;
+use pgs_command::board::OpenBoard;
+use pgs_command::numbers::grouped;
+use pgs_command::options::bandwidth::bandwidth_text;
+use pgs_command::options::solver::time_step_text;
+use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::fact;
+use pgs_command::permutation::Permutation;
 use step_folder::digest;
 
 /// The summary of the run; none before the first step.

@@ -13,9 +13,9 @@ use zynq_pgs_view::picture::Picture;
 use zynq_pgs_view::{ViewError, gltf, npz};
 
 use super::film::{Film, Rhythm};
-use crate::failure::{Cause, Failure};
-use crate::numbers::grouped;
-use crate::output::files::{Named, check_folder, unwritten};
+use pgs_command::failure::{Cause, Failure};
+use pgs_command::numbers::grouped;
+use pgs_command::output::files::{Named, check_folder, unwritten};
 
 /// Most frames without a choice of the user's, beside the start.
 const FRAMES: u32 = 200;

@@ -6,7 +6,8 @@ use scene::{Scene, StepClock, interpolate};
 use zynq_pgs::Body;
 use zynq_pgs_view::{Recording, ViewError};
 
-use crate::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure};
+use pgs_command::options::solver::time_of;
 
 /// Part of a step that counts as none: the clock counts nanoseconds.
 const WHOLE: f32 = 1e-3;
@@ -120,13 +121,6 @@ impl Film {
         let time = time_of(f64::from(steps) + f64::from(part), self.time_step);
         self.recording.add(steps, time, bodies).map_err(not_shown)
     }
-}
-
-/// The simulated time after a number of steps, s.
-pub(crate) fn time_of(steps: impl Into<f64>, time_step: f32) -> f32 {
-    #[allow(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-    let time = (f64::from(time_step) * steps.into()) as f32;
-    time
 }
 
 /// A frame that no file shows.

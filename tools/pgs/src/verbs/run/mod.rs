@@ -21,23 +21,23 @@ use self::files::{FileArgs, Written};
 use self::film::Film;
 use self::row::{ALL_COLUMNS, Row, columns, step};
 use self::summary::Totals;
-use crate::board::{self, OpenBoard};
 use crate::bug_report::FaultArgs;
-use crate::common::CommonArgs;
-use crate::failure::{Failure, Verdict};
 use crate::footprint::Footprint;
-use crate::interrupt::Interrupt;
-use crate::options::build::BuildArgs;
-use crate::options::ordering::OrderingArgs;
-use crate::options::planned::PlannedArgs;
-use crate::options::scenes::{CONTACT_REACH, SceneArgs};
-use crate::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
-use crate::output::facts::fact;
-use crate::output::files::Files;
-use crate::output::order;
-use crate::output::progress::progress_bar;
-use crate::output::table::{Column, heading, line};
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
+use pgs_command::board::{self, OpenBoard};
+use pgs_command::common::CommonArgs;
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::interrupt::Interrupt;
+use pgs_command::options::build::BuildArgs;
+use pgs_command::options::ordering::OrderingArgs;
+use pgs_command::options::planned::PlannedArgs;
+use pgs_command::options::scenes::{CONTACT_REACH, ITERATIONS, STEPS, SceneArgs};
+use pgs_command::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
+use pgs_command::output::facts::fact;
+use pgs_command::output::files::Files;
+use pgs_command::output::order;
+use pgs_command::output::progress::progress_bar;
+use pgs_command::output::table::{Column, heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -73,10 +73,6 @@ and the energy of the same scene without a warm start and with one friction, ste
 
 /// Default rows of the table.
 const ROWS: u32 = 15;
-/// Default steps of the cubes, and of the shapes.
-pub(crate) const STEPS: [u32; 2] = [120, 600];
-/// Default contact and friction iterations of a step: enough to carry 30 layers.
-pub(crate) const ITERATIONS: u32 = 10;
 
 /// Step a pile dropped on the ground.
 #[derive(Debug, Clone, Args)]

@@ -6,11 +6,11 @@ use scene::Scene;
 use serde_json::Value;
 use zynq_pgs::{Accelerator, ContactMemory, StepParameters, StepReport, WarmCollisions};
 
-use crate::board::is_cancelled;
-use crate::numbers::{Bound, grouped};
-use crate::output::table::Column;
-use crate::output::{limit_text, milliseconds, report_json};
-use crate::permutation::Arranger;
+use pgs_command::board::is_cancelled;
+use pgs_command::numbers::{Bound, grouped};
+use pgs_command::output::table::Column;
+use pgs_command::output::{limit_text, milliseconds, report_json};
+use pgs_command::permutation::Arranger;
 
 /// Share of the last step's impulses that a warm step begins with (Bullet's).
 const WARM_FACTOR: f32 = 0.85;

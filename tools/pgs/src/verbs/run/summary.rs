@@ -4,18 +4,18 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use bitstream_model::estimate::thesis::{self, recorded};
-use bitstream_model::estimate::{Records, StepCycles};
+use pgs_thesis::estimate::thesis::{self, recorded};
+use pgs_thesis::estimate::{Records, StepCycles};
 use scene::{Scene, moving_mass, penetration};
 use serde_json::{Value, json};
 use zynq_pgs::interface::profile::Profile;
 use zynq_pgs::{Limit, StepParameters};
 
 use super::row::Row;
-use crate::numbers::grouped;
-use crate::options::solver::time_step_text;
-use crate::output::facts::fact;
-use crate::output::{limit_text, milliseconds};
+use pgs_command::numbers::grouped;
+use pgs_command::options::solver::time_step_text;
+use pgs_command::output::facts::fact;
+use pgs_command::output::{limit_text, milliseconds};
 
 /// Average speed up to which a pile is at rest (root mean square, weighted by mass, rotation
 /// included), m/s.

@@ -1,0 +1,311 @@
+//! Options of every verb: output, board, DMA memory, FPGA manager.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use zynq_pgs::{BoardChoice, BoardTextError, ManagerChoice, MemoryChoice};
+
+use crate::environment::{BOARD, MANAGER, MEMORY, RTL, is_blank};
+use crate::options::memory::memory_choice;
+
+/// The options of every verb, as parsed.
+#[derive(Debug, Clone, Args)]
+pub struct CommonOptions {
+    /// Print one JSON document instead of text.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Board to use.
+    #[arg(
+        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio[:NODE] \
+                (the UIO node of that name, or NODE-control, NODE-dma0 ... for each region), devmem \
+                (registers through /dev/mem, at the addresses of the interface; needs root), \
+                emulated or socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] \
+                [default: auto]",
+        long,
+        global = true,
+        value_name = "BOARD",
+        value_parser = board_name
+    )]
+    board: Option<BoardName>,
+    /// DMA memory of a real board.
+    #[arg(
+        help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
+                \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
+                devmem[:ADDRESS+BYTES] [env: PGS_MEMORY] [default: auto]",
+        long,
+        global = true,
+        value_name = "MEMORY",
+        value_parser = memory_choice
+    )]
+    memory: Option<MemoryChoice>,
+    /// FPGA manager of a real board's logic.
+    #[arg(
+        help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
+                ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic \
+                that the kernel did not load, for example by JTAG. WARNING: an access to logic that \
+                is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+        long,
+        global = true,
+        value_name = "MANAGER",
+        value_parser = manager_choice
+    )]
+    manager: Option<ManagerChoice>,
+    /// Accelerator of an emulated board.
+    #[arg(
+        help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
+                Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the model \
+                beside it on the same beats, up to the first difference [env: PGS_RTL, the PATH of \
+                rtl] [default: model]",
+        long,
+        global = true,
+        value_name = "ACCELERATOR",
+        value_parser = accelerator_choice
+    )]
+    accelerator: Option<AcceleratorChoice>,
+}
+
+/// The accelerator of an emulated board.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum AcceleratorChoice {
+    /// The built-in model.
+    #[default]
+    Model,
+    /// A simulator of the generated Verilog, at this path.
+    Rtl(PathBuf),
+    /// The simulator at this path, and the model in lock step with it.
+    Both(PathBuf),
+}
+
+impl AcceleratorChoice {
+    /// The path of the simulator, and whether the model runs beside it.
+    pub fn simulator(&self) -> Option<(&Path, bool)> {
+        match self {
+            Self::Model => None,
+            Self::Rtl(path) => Some((path, false)),
+            Self::Both(path) => Some((path, true)),
+        }
+    }
+}
+
+/// The options of every verb, with the environment and the defaults filled in.
+#[derive(Debug, Clone)]
+pub struct CommonArgs {
+    /// Whether to print one JSON document instead of text.
+    pub json: bool,
+    /// The board.
+    pub board: BoardName,
+    /// DMA memory of a real board.
+    pub memory: MemoryChoice,
+    /// Whether the memory was named by the environment and not by the command line.
+    pub memory_of_environment: bool,
+    /// FPGA manager of a real board's logic.
+    pub manager: ManagerChoice,
+    /// Accelerator of an emulated board.
+    pub accelerator: AcceleratorChoice,
+}
+
+/// A board named on the command line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BoardName {
+    /// The UIO node if there is one, else the emulated board.
+    Auto,
+    /// A UIO node of this name, or one node for each region.
+    Uio(String),
+    /// Registers through /dev/mem.
+    Devmem,
+    /// An emulated board of this process.
+    Emulated,
+    /// A board in another process, served at this socket.
+    Socket(PathBuf),
+}
+
+/// The emulated board; its build is in options of its own.
+const EMULATED: &str = "emulated";
+
+/// Reads the name of a board.
+fn board_name(text: &str) -> Result<BoardName, String> {
+    let choice: BoardChoice = match text.parse() {
+        Ok(BoardChoice::Built(_)) if text != EMULATED => {
+            return Err(format!(
+                "give --board {EMULATED}, and its build as options (--profile and others)"
+            ));
+        }
+        Err(BoardTextError::Unknown { .. }) => {
+            return Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned());
+        }
+        choice => choice.map_err(|error| error.to_string())?,
+    };
+    match choice {
+        BoardChoice::Automatic => Ok(BoardName::Auto),
+        BoardChoice::Uio { node } => Ok(BoardName::Uio(node)),
+        BoardChoice::DevMem(_) => Ok(BoardName::Devmem),
+        BoardChoice::Built(_) => Ok(BoardName::Emulated),
+        BoardChoice::Served { socket } => Ok(BoardName::Socket(socket)),
+        _ => Err(format!("no command takes the board {text:?}")),
+    }
+}
+
+/// Reads the choice of an accelerator.
+fn accelerator_choice(text: &str) -> Result<AcceleratorChoice, String> {
+    match text.split_once(':') {
+        None if text == "model" => Ok(AcceleratorChoice::Model),
+        Some(("rtl", path)) if !path.is_empty() => Ok(AcceleratorChoice::Rtl(path.into())),
+        Some(("both", path)) if !path.is_empty() => Ok(AcceleratorChoice::Both(path.into())),
+        _ => Err("expected model, rtl:PATH or both:PATH".to_owned()),
+    }
+}
+
+/// Reads the path of a simulator.
+fn simulator_path(text: &str) -> Result<AcceleratorChoice, String> {
+    Ok(AcceleratorChoice::Rtl(text.into()))
+}
+
+/// Reads the choice of an FPGA manager.
+fn manager_choice(text: &str) -> Result<ManagerChoice, String> {
+    let number = |text: &str| text.strip_prefix("fpga")?.parse::<u32>().ok();
+    match text.trim() {
+        "auto" => Ok(ManagerChoice::Automatic),
+        "none" => Ok(ManagerChoice::Unasked),
+        device if number(device).is_some() => Ok(ManagerChoice::Device(device.to_owned())),
+        _ => {
+            Err("expected auto, none, or a device of /sys/class/fpga_manager, as fpga0".to_owned())
+        }
+    }
+}
+
+/// The common options that a verb reads. The environment is read for these only: a wrong variable
+/// breaks no command that does not use it.
+#[derive(Debug, Clone, Copy)]
+pub struct Reads {
+    /// Whether a board is opened.
+    pub board: bool,
+    /// Whether the FPGA manager is asked.
+    pub manager: bool,
+    /// Whether the accelerator of an emulated board can be chosen.
+    pub accelerator: bool,
+}
+
+impl CommonArgs {
+    /// The options of a command on the emulated board, with text.
+    #[must_use]
+    pub fn emulated() -> Self {
+        Self {
+            json: false,
+            board: BoardName::Emulated,
+            memory: MemoryChoice::Automatic,
+            memory_of_environment: false,
+            manager: ManagerChoice::Automatic,
+            accelerator: AcceleratorChoice::Model,
+        }
+    }
+}
+
+impl CommonOptions {
+    /// Fills in options that the command line leaves out from the environment, through `variable`.
+    ///
+    /// # Errors
+    ///
+    /// Fails where a variable has a wrong value, or an option has no effect.
+    pub fn complete(
+        self,
+        reads: Reads,
+        variable: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<CommonArgs, String> {
+        let Self { json, board, memory, manager, accelerator } = self;
+        let board = match board {
+            None if reads.board => instead_of("--board", BOARD, &variable, board_name)?,
+            given => given,
+        };
+        let board = board.unwrap_or(BoardName::Auto);
+        let real = !matches!(board, BoardName::Emulated | BoardName::Socket(_));
+        let named = match reads.board && real && memory.is_none() {
+            true => instead_of("--memory", MEMORY, &variable, memory_choice)?,
+            false => None,
+        };
+        let memory_of_environment = named.is_some();
+        let memory = memory.or(named).unwrap_or(MemoryChoice::Automatic);
+        let manager = match manager {
+            None if reads.manager && real => {
+                instead_of("--manager", MANAGER, &variable, manager_choice)?
+            }
+            given => given,
+        };
+        let manager = manager.unwrap_or_default();
+        let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
+        let accelerator = match accelerator {
+            Some(_) if !reads.accelerator => {
+                return Err("this command takes no --accelerator".to_owned());
+            }
+            Some(_) if !emulated => {
+                return Err(
+                    "--accelerator is for an emulated board of this process; leave it out, \
+                            or add --board emulated"
+                        .to_owned(),
+                );
+            }
+            None if reads.accelerator && emulated => {
+                instead_of("--accelerator", RTL, &variable, simulator_path)?
+            }
+            given => given,
+        };
+        let accelerator = accelerator.unwrap_or_default();
+        Ok(CommonArgs { json, board, memory, memory_of_environment, manager, accelerator })
+    }
+}
+
+/// Reads an option from a variable of the environment.
+fn instead_of<T>(
+    option: &str,
+    name: &str,
+    variable: impl Fn(&str) -> Option<OsString>,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Result<Option<T>, String> {
+    let Some(text) = variable(name).filter(|text| !is_blank(text)) else { return Ok(None) };
+    let found = text.to_str().ok_or_else(|| "expected text".to_owned()).and_then(read);
+    found.map(Some).map_err(|expected| {
+        format!(
+            "the environment variable {name} is {text:?}: {expected}; correct or unset it, or give \
+             {option}"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_named_as_in_the_library_and_its_build_in_options() {
+        let node = |name: &str| BoardName::Uio(name.to_owned());
+        for (text, board) in [
+            ("auto", BoardName::Auto),
+            ("uio", node("pgs")),
+            ("uio:other", node("other")),
+            ("devmem", BoardName::Devmem),
+            ("emulated", BoardName::Emulated),
+            ("socket:a:b", BoardName::Socket("a:b".into())),
+        ] {
+            assert_eq!(board_name(text), Ok(board));
+        }
+        for (text, part) in [
+            ("emulated:float", "--profile"),
+            ("emulated:fast", "begin with a profile"),
+            ("uio:", "expected auto, "),
+            ("abacus", "expected auto, "),
+        ] {
+            let error = board_name(text).expect_err(text);
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_manager_is_a_device_none_or_found_by_its_name() {
+        assert_eq!(manager_choice("auto"), Ok(ManagerChoice::Automatic));
+        assert_eq!(manager_choice("none"), Ok(ManagerChoice::Unasked));
+        assert_eq!(manager_choice("fpga10"), Ok(ManagerChoice::Device("fpga10".to_owned())));
+        for wrong in ["fpga", "fpgax", "fpga0/..", "0", "Xilinx"] {
+            manager_choice(wrong).expect_err(wrong);
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! The options that describe an emulated board. The library knows their values and their texts.
+
+use bitstream_model::interface::fence::Fence;
+use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::profile::{Inertia, Profile};
+use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use zynq_pgs::emulation::{Build, BuildError};
+
+/// The build of the emulated board; a real board is built as its bitstream is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
+#[command(next_help_heading = "Emulated board")]
+pub struct BuildArgs {
+    /// Design of the accelerator [default: float]
+    #[arg(long, value_name = "PROFILE", value_parser = profile())]
+    profile: Option<&'static Profile>,
+    /// Numbers on streams of 16 bits: binary16 is IEEE 754, rounded to nearest even; thesis16 is the
+    /// thesis' own, rounded by truncation, and has no zero; thesis16-literal cuts bits out of the
+    /// exponent even where a small number becomes a large one [default: binary16]
+    #[arg(long, value_parser = choice("format", |build| build.format))]
+    format: Option<StreamFormat>,
+    /// Precision of the pipeline's operators; storage keeps the width of the profile [default: the
+    /// profile's]
+    #[arg(long, value_parser = choice("arithmetic", |build| build.arithmetic))]
+    arithmetic: Option<Precision>,
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with
+    /// every body [default: isotropic]
+    #[arg(long, value_parser = choice("inertia", |build| build.inertia))]
+    inertia: Option<Inertia>,
+    /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
+    #[arg(long, value_parser = choice("hazards", |build| build.hazards))]
+    hazards: Option<Hazards>,
+    /// Hazard window in issue slots [default: the profile's]
+    #[arg(long, value_name = "SLOTS", value_parser = number("window", |build| build.window))]
+    window: Option<u32>,
+    /// Keep subnormal numbers or flush them to zero [default: keep]
+    #[arg(long, value_parser = choice("subnormals", |build| build.subnormals))]
+    subnormals: Option<Subnormals>,
+    /// Memory bandwidth in GB/s, or "unlimited" [default: 12.8]
+    #[arg(long, value_name = "GBPS", value_parser = number("bandwidth", |build| build.bandwidth))]
+    bandwidth: Option<Bandwidth>,
+    /// Width of the DMA length registers in bits, 8 to 26 [default: 26]
+    #[arg(
+        long,
+        value_name = "BITS",
+        value_parser = number("length-width", |build| build.length_width)
+    )]
+    length_width: Option<u32>,
+    /// Width of DMA addresses in bits, 32 to 64 [default: 40]
+    #[arg(
+        long,
+        value_name = "BITS",
+        value_parser = number("address-width", |build| build.address_width)
+    )]
+    address_width: Option<u32>,
+    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K, at a
+    /// multiple of it [default: no fence]
+    #[arg(long, value_name = "BASE+BYTES", value_parser = number("fence", |build| build.fence))]
+    fence: Option<Fence>,
+    /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
+    /// for packing and unpacking a step; no result depends on their number [default: one per
+    /// processor, at most 4]
+    #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
+    threads: Option<usize>,
+    /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]
+    #[arg(long, value_parser = choice("lanes", |build| build.lanes))]
+    lanes: Option<bool>,
+}
+
+impl BuildArgs {
+    /// The build that the options describe.
+    pub fn build(&self) -> Build {
+        Build {
+            profile: self.profile,
+            format: self.format,
+            arithmetic: self.arithmetic,
+            inertia: self.inertia,
+            hazards: self.hazards,
+            window: self.window,
+            subnormals: self.subnormals,
+            bandwidth: self.bandwidth,
+            length_width: self.length_width,
+            address_width: self.address_width,
+            fence: self.fence,
+            threads: self.threads,
+            lanes: self.lanes,
+        }
+    }
+}
+
+/// Parses the name of a profile.
+pub fn profile() -> impl TypedValueParser<Value = &'static Profile> {
+    choice("profile", |build| build.profile)
+}
+
+/// Parses an option whose values have names.
+fn choice<T: Clone + Send + Sync + 'static>(
+    key: &'static str,
+    get: fn(&Build) -> Option<T>,
+) -> impl TypedValueParser<Value = T> {
+    let value = number(key, get);
+    PossibleValuesParser::new(Build::names(key)).try_map(move |name| value(&name))
+}
+
+/// Parses an option whose values are numbers.
+pub fn number<T>(
+    key: &'static str,
+    get: fn(&Build) -> Option<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let mut build = Build::default();
+        let set = build.set(key, text).map_err(|error| match error {
+            BuildError::Value { expected, .. } => format!("expected {expected}"),
+            error => error.to_string(),
+        });
+        set.and_then(|()| get(&build).ok_or_else(|| format!("{key} has no such value")))
+    }
+}
+
+/// The first given option that describes a board. `--threads` does not: collision detection and
+/// packing use it with every board.
+pub fn board_option(build: &Build) -> Option<String> {
+    let given = |key: &&str| *key != "threads" && build.value(key).is_some();
+    Build::keys().find(given).map(|key| format!("--{key}"))
+}
+
+/// A board as its text, without what changes no result. Where no text tells all number formats, as
+/// for a bitstream that this command cannot build, the formats follow in words.
+pub fn described(config: &BoardConfig) -> String {
+    let build = Build { threads: None, lanes: None, ..Build::of(config) };
+    let variant = config.variant();
+    if build.config().variant() == variant {
+        return build.to_string();
+    }
+    let Numbers { collisions, bodies, poses, rows, updates, velocities, impulses } =
+        variant.numbers;
+    format!(
+        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates {}; on chip: \
+         velocities {}, impulses {})",
+        collisions.name(),
+        bodies.name(),
+        poses.name(),
+        rows.name(),
+        updates.name(),
+        velocities.name(),
+        impulses.name(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Options {
+        #[command(flatten)]
+        build: BuildArgs,
+    }
+
+    #[test]
+    fn each_option_of_the_command_line_is_that_of_a_text() {
+        let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+                    length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
+        let expected: Build = text.parse().expect("a build");
+        let options = Build::keys()
+            .map(|key| format!("--{key}={}", expected.value(key).expect("given in the text")));
+        let parsed = Options::try_parse_from([String::new()].into_iter().chain(options));
+        assert_eq!(parsed.expect("options").build.build(), expected);
+        Options::try_parse_from(["", "--format", "f32"]).expect_err("no choice");
+        let error = Options::try_parse_from(["", "--window", "0"]).expect_err("no window");
+        assert!(error.to_string().contains(": expected a whole number from 1 to "), "{error}");
+    }
+
+    #[test]
+    fn every_option_is_named_when_it_is_given() {
+        assert_eq!(board_option(&Build::default()), None);
+        for (key, value) in [
+            ("format", "thesis16"),
+            ("hazards", "unchecked"),
+            ("lanes", "off"),
+            ("profile", "half"),
+        ] {
+            let mut build = Build::default();
+            build.set(key, value).expect(key);
+            assert_eq!(board_option(&build), Some(format!("--{key}")));
+        }
+        // Detection and packing use them on a real board, too.
+        assert_eq!(board_option(&Build { threads: Some(1), ..Build::default() }), None);
+    }
+
+    #[test]
+    fn formats_that_no_text_says_are_said_in_words() {
+        let of = |name: &str, change: fn(&mut Numbers)| {
+            let profile = Profile::by_name(name).expect(name);
+            let mut numbers = profile.numbers;
+            change(&mut numbers);
+            described(&BoardConfig { profile, numbers: Some(numbers), ..BoardConfig::default() })
+        };
+        assert_eq!(
+            of("half", |numbers| numbers.velocities = Precision::F32),
+            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+             updates binary16; on chip: velocities f32, impulses binary16)"
+        );
+        assert_eq!(
+            of("half", |numbers| numbers.updates = Precision::F32),
+            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+             updates f32; on chip: velocities binary16, impulses binary16)"
+        );
+        assert_eq!(
+            of("half", |numbers| numbers.bodies = StreamFormat::Thesis16).find('('),
+            Some(14)
+        );
+        for text in ["float", "naive,flush,world", "half,thesis16,f32", "half,f32,world"] {
+            assert_eq!(described(&text.parse::<Build>().expect(text).config()), text);
+        }
+        let of_this_machine: Build = "float,threads=1,lanes=off".parse().expect("a build");
+        assert_eq!(described(&of_this_machine.config()), "float");
+    }
+}

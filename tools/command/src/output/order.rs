@@ -1,0 +1,137 @@
+//! Reports the order in which a step's collisions were sent, and the reason for it.
+
+use serde_json::{Value, json};
+use zynq_pgs::order::Order;
+use zynq_pgs::{Capabilities, OrderChoice, StepReport};
+
+use crate::numbers::grouped;
+use crate::options::ordering::{is_sequential, name};
+use crate::permutation::Permutation;
+
+/// How the order of a step relates to Bullet's, in words; none if the order is Bullet's and the
+/// comparison fails all the same.
+pub fn beside_bullet(
+    report: &StepReport,
+    capabilities: &Capabilities,
+    permutation: Option<Permutation>,
+) -> Option<&'static str> {
+    match report.order {
+        Order::AsGiven if permutation.is_some() => Some(BY_ORDER_ALONE),
+        Order::AsGiven if is_sequential(capabilities) => Some("Bullet's own, to compare with it"),
+        Order::AsGiven => None,
+        _ => Some(BY_ORDER_ALONE),
+    }
+}
+
+const BY_ORDER_ALONE: &str = "not Bullet's: results differ by the order alone";
+
+/// The name of a step's order: the command's, or else the driver's.
+fn asked_name(report: &StepReport, permutation: Option<Permutation>) -> String {
+    permutation.map_or_else(|| name(report.order), Permutation::text)
+}
+
+/// The orders of a run's steps, and the number of steps in each: one order may fall back to another
+/// ([`Order::HazardFreeNearby`]).
+#[derive(Debug, Default)]
+pub struct OrdersSent(Vec<(Order, u64)>);
+
+impl OrdersSent {
+    /// Counts a step.
+    pub fn count(&mut self, order: Order) {
+        match self.0.iter_mut().find(|(taken, _)| *taken == order) {
+            Some((_, steps)) => *steps += 1,
+            None => self.0.push((order, 1)),
+        }
+    }
+
+    /// In words, in the order of the first steps; none if all steps had one order.
+    pub fn text(&self) -> Option<String> {
+        let all: u64 = self.0.iter().map(|(_, steps)| steps).sum();
+        let each = self.0.iter().map(|(order, steps)| (name(*order), grouped(*steps)));
+        let texts: Vec<String> = each.map(|(name, steps)| format!("{name} in {steps}")).collect();
+        (texts.len() > 1).then(|| format!("of {} steps {}", grouped(all), texts.join(", ")))
+    }
+}
+
+/// The order of a step, and the reason for it.
+pub fn with_reason(report: &StepReport, permutation: Option<Permutation>) -> String {
+    let name = asked_name(report, permutation);
+    match reason(report) {
+        Some(reason) => format!("{name}: {reason}"),
+        None => name,
+    }
+}
+
+/// Why the driver took this order; none if the caller asked for it.
+pub fn reason(report: &StepReport) -> Option<String> {
+    let OrderChoice::Cheapest(costs) = report.order_choice else {
+        return match report.order_choice {
+            OrderChoice::NoInterlock => Some("this board does not wait on hazards".to_owned()),
+            _ => None,
+        };
+    };
+    let as_given = grouped(costs.as_given);
+    Some(match costs.reordered.map(|cycles| (grouped(cycles), cycles < costs.as_given)) {
+        Some((reordered, true)) => format!(
+            "this board waits on hazards; the passes take at most {reordered} cycles, as given \
+             they take more than {as_given}"
+        ),
+        Some((reordered, false)) => format!(
+            "this board waits on hazards; the passes take {as_given} cycles, {reordered} without \
+             hazards"
+        ),
+        None => format!("no order takes fewer cycles for the passes than {as_given}"),
+    })
+}
+
+/// The order of a step in words.
+pub fn text(report: &StepReport, permutation: Option<Permutation>) -> String {
+    let mut text = asked_name(report, permutation);
+    if report.empty > 0 {
+        let share = report.empty as f64 / (report.collisions as f64).max(1.0);
+        text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);
+    }
+    if let Some(verified) = &report.verified {
+        text += &format!(
+            ", verified: {} hazards, {} bodies alive at most, longest span {} slots",
+            verified.hazards,
+            grouped(verified.most_alive as u64),
+            grouped(verified.longest_span as u64),
+        );
+    }
+    text
+}
+
+/// The same for programs.
+pub fn to_json(report: &StepReport) -> Value {
+    json!({
+        "name": name(report.order),
+        "choice": choice_json(&report.order_choice),
+        "empty": report.empty,
+        "verified": report.verified.map(|verified| json!({
+            "hazards": verified.hazards,
+            "lost_updates": verified.lost_updates,
+            "most_alive": verified.most_alive,
+            "longest_span": verified.longest_span,
+            "mean_span": verified.mean_span,
+        })),
+    })
+}
+
+/// Why the driver took this order, for programs.
+fn choice_json(choice: &OrderChoice) -> Value {
+    let name = match choice {
+        OrderChoice::Asked => "asked",
+        OrderChoice::NoInterlock => "no_interlock",
+        OrderChoice::Cheapest(_) => "cheapest",
+        _ => "other",
+    };
+    match choice {
+        OrderChoice::Cheapest(costs) => json!({
+            "reason": name,
+            "as_given_cycles": costs.as_given,
+            "reordered_cycles": costs.reordered,
+        }),
+        _ => json!({ "reason": name }),
+    }
+}

@@ -1,0 +1,178 @@
+//! An experiment: a place of the thesis, arguments, and a run that leads to tables and figures.
+
+use std::io::Write;
+
+use clap::{ArgMatches, Args, Command};
+use pgs_command::failure::{Failure, Verdict};
+use pgs_command::output::facts::fact;
+use pgs_command::output::width::stdout_width;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::figure::Figure;
+use crate::index::{Row, section_key};
+use crate::session::Session;
+use crate::table::Table;
+
+/// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
+pub(crate) const SCHEMA: u32 = 3;
+
+/// The last line of an outcome that Ctrl-C has cut short.
+pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
+
+/// An experiment of the thesis part.
+pub(crate) trait Experiment: Sync {
+    /// Its name on the command line.
+    fn id(&self) -> &'static str;
+
+    /// Its place in the thesis.
+    fn thesis(&self) -> &'static str;
+
+    /// Its subject, in a line.
+    fn about(&self) -> &'static str;
+
+    /// Whether it steps a board.
+    fn opens_board(&self) -> bool;
+
+    /// Adds its arguments and its help.
+    fn arguments(&self, command: Command) -> Command;
+
+    /// Measures or computes; `matches` are of its arguments.
+    fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure>;
+}
+
+/// The findings of an experiment.
+#[derive(Debug, Default)]
+pub(crate) struct Part {
+    /// Whether no Ctrl-C ended it.
+    pub(crate) complete: bool,
+    /// Whether everything that it compared agrees.
+    pub(crate) agrees: bool,
+    /// The measured step, behind short labels.
+    pub(crate) facts: Vec<(&'static str, String)>,
+    pub(crate) tables: Vec<Table>,
+    pub(crate) figures: Vec<Figure>,
+    /// Rows of the index that lead to them.
+    pub(crate) rows: Vec<Row>,
+    /// Members for programs beside the tables.
+    pub(crate) data: Value,
+}
+
+impl Part {
+    pub(crate) fn of(tables: Vec<Table>) -> Self {
+        Self { complete: true, agrees: true, tables, data: json!({}), ..Self::default() }
+    }
+
+    /// Takes the members for programs from an outcome.
+    pub(crate) fn with(mut self, outcome: &impl Serialize) -> Self {
+        self.data = serde_json::to_value(outcome).unwrap_or_else(|_| json!({}));
+        self
+    }
+
+    /// Adds the figures and rows of another part behind this one's.
+    pub(crate) fn append(&mut self, mut other: Self) {
+        self.tables.append(&mut other.tables);
+        self.figures.append(&mut other.figures);
+        self.rows.append(&mut other.rows);
+    }
+
+    /// Sorts by the sections of the thesis; within one, figures and rows keep their order.
+    pub(crate) fn sort(&mut self) {
+        self.figures.sort_by_key(|figure| section_key(figure.thesis));
+        self.rows.sort_by_key(|row| section_key(&row.thesis));
+    }
+
+    /// Adds a line for people.
+    pub(crate) fn fact(&mut self, label: &'static str, text: impl Into<String>) {
+        self.facts.push((label, text.into()));
+    }
+
+    /// The end of the command.
+    pub(crate) fn verdict(&self) -> Verdict {
+        match (self.complete, self.agrees) {
+            (_, false) => Verdict::Differs,
+            (true, true) => Verdict::Done,
+            (false, true) => Verdict::Interrupted,
+        }
+    }
+
+    /// For programs.
+    pub(crate) fn to_json(&self, experiment: &dyn Experiment) -> Value {
+        let mut document = self.data.clone();
+        document["schema"] = SCHEMA.into();
+        document["verb"] = "thesis".into();
+        document["experiment"] = experiment.id().into();
+        document["thesis"] = experiment.thesis().into();
+        document["complete"] = self.complete.into();
+        document["tables"] = self.tables.iter().map(Table::to_json).collect();
+        document["figures"] = self.figures.iter().map(Figure::to_json).collect();
+        document["index"] = self.rows.iter().map(Row::to_json).collect();
+        document
+    }
+
+    /// For people.
+    pub(crate) fn write_text(&self, out: &mut dyn Write) -> Result<(), Failure> {
+        for (label, text) in &self.facts {
+            fact(out, label, text)?;
+        }
+        for table in &self.tables {
+            write!(out, "\n{}", table.to_text(stdout_width()))?;
+        }
+        if !self.complete && self.agrees {
+            writeln!(out, "{INTERRUPTED}")?;
+        }
+        Ok(())
+    }
+
+    /// As Markdown.
+    pub(crate) fn write_markdown(
+        &self,
+        experiment: &dyn Experiment,
+        out: &mut dyn Write,
+    ) -> Result<(), Failure> {
+        writeln!(out, "## {}: {}\n", experiment.thesis(), experiment.id())?;
+        for (_, text) in &self.facts {
+            writeln!(out, "{text}\n")?;
+        }
+        for table in &self.tables {
+            write!(out, "{}", table.to_markdown())?;
+        }
+        Ok(())
+    }
+}
+
+/// An experiment by a function of its arguments.
+pub(crate) struct Measured<A> {
+    pub(crate) id: &'static str,
+    pub(crate) thesis: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) opens_board: bool,
+    pub(crate) run: fn(&A, &Session) -> Result<Part, Failure>,
+}
+
+impl<A: Args> Experiment for Measured<A> {
+    fn id(&self) -> &'static str {
+        self.id
+    }
+
+    fn thesis(&self) -> &'static str {
+        self.thesis
+    }
+
+    fn about(&self) -> &'static str {
+        self.about
+    }
+
+    fn opens_board(&self) -> bool {
+        self.opens_board
+    }
+
+    fn arguments(&self, command: Command) -> Command {
+        A::augment_args(command).about(self.about)
+    }
+
+    fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure> {
+        let arguments = A::from_arg_matches(matches).map_err(Failure::input)?;
+        (self.run)(&arguments, session)
+    }
+}

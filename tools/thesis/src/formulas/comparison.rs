@@ -1,0 +1,277 @@
+//! Compares with GPU and CPU: Tables 6.5 to 6.7 and 6.9 to 6.11, equation 6.5.
+//!
+//! Times and powers of other machines are the thesis'; only the accelerator's time is ours, and it
+//! is modelled.
+
+use crate::estimate::thesis::amdahl;
+use crate::estimate::thesis::recorded::{
+    ACCELERATED_SHARE, CPU, Design, GPU, Platform, ZCU102_WATTS,
+};
+use crate::estimate::{Records, StepTime};
+use bitstream_model::Bandwidth;
+use pgs_interface::profile::Variant;
+
+use super::scene::{Scene, difference};
+use crate::table::{Cell, Kind, Table, text};
+
+pub(super) fn tables(scene: &Scene) -> Vec<Table> {
+    vec![platforms(), against(scene)]
+}
+
+fn platforms() -> Table {
+    let mut table = Table::new(
+        "platforms",
+        "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
+        &[
+            ("platform", "platform"),
+            ("ms", "ms"),
+            ("watts", "W"),
+            ("joules", "J"),
+            ("recomputed_joules", "J from ms and W"),
+            ("difference_percent", "difference"),
+            ("kind", "kind"),
+        ],
+    );
+    for platform in [GPU, CPU] {
+        let joules = platform.watts * platform.latency_ms / 1e3;
+        table.row([
+            text(platform.name),
+            Cell::Number(platform.latency_ms, 2),
+            Cell::Number(platform.watts, 0),
+            Cell::Number(platform.joules, 2),
+            Cell::Number(joules, 3),
+            difference(joules, platform.joules),
+            Kind::Recorded.cell(),
+        ]);
+    }
+    table.row([
+        text("ZCU102"),
+        Cell::Missing,
+        Cell::Number(ZCU102_WATTS, 0),
+        Cell::Missing,
+        Cell::Missing,
+        Cell::Missing,
+        Kind::Recorded.cell(),
+    ]);
+    table.note(format!(
+        "T6.2 and T6.3 give thermal design powers of {} and {} W for the same GPU and CPU; the 15 W of \
+         the board are its maximum, not measured.",
+        GPU.design_watts, CPU.design_watts
+    ));
+    table
+}
+
+/// The figures that follow from one latency.
+pub(crate) struct Outcome {
+    pub(crate) ms: f64,
+}
+
+impl Outcome {
+    fn joules(&self) -> f64 {
+        ZCU102_WATTS * self.ms / 1e3
+    }
+    pub(crate) fn speedup(&self, platform: &Platform) -> f64 {
+        platform.latency_ms / self.ms
+    }
+    /// Computes with both energies unrounded, not with the printed ones.
+    pub(crate) fn energy(&self, platform: &Platform) -> f64 {
+        self.energy_at(platform.watts, platform)
+    }
+    /// The same with another power of the platform, W.
+    fn energy_at(&self, watts: f64, platform: &Platform) -> f64 {
+        watts * platform.latency_ms / 1e3 / self.joules()
+    }
+    fn whole_step(&self) -> f64 {
+        amdahl(ACCELERATED_SHARE, self.speedup(&GPU))
+    }
+}
+
+/// A figure of the thesis' comparison.
+struct Figure {
+    /// The thesis' table.
+    table: fn(&Design) -> &'static str,
+    name: &'static str,
+    /// The printed figure, if there is one.
+    printed: fn(&Design) -> Option<f64>,
+    /// How to compute the figure: from a latency, or from the thesis' powers alone.
+    of: Source,
+}
+
+enum Source {
+    Latency(fn(&Outcome) -> f64),
+    Powers(f64),
+}
+
+const FIGURES: [Figure; 13] = [
+    Figure {
+        table: |design| design.comparison,
+        name: "latency, ms",
+        printed: |design| Some(design.latency_ms),
+        of: Source::Latency(|outcome| outcome.ms),
+    },
+    Figure {
+        table: |design| design.comparison,
+        name: "energy at 15 W, J",
+        printed: |design| Some(design.joules),
+        of: Source::Latency(Outcome::joules),
+    },
+    Figure {
+        table: |design| design.speedups,
+        name: "speed-up over GTX 980",
+        printed: |design| Some(design.speedup.gpu),
+        of: Source::Latency(|outcome| outcome.speedup(&GPU)),
+    },
+    Figure {
+        table: |design| design.speedups,
+        name: "speed-up over i7-3770",
+        printed: |design| Some(design.speedup.cpu),
+        of: Source::Latency(|outcome| outcome.speedup(&CPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency over GTX 980",
+        printed: |design| Some(design.power.gpu),
+        of: Source::Powers(GPU.watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency over i7-3770",
+        printed: |design| Some(design.power.cpu),
+        of: Source::Powers(CPU.watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency over GTX 980",
+        printed: |design| Some(design.energy.gpu),
+        of: Source::Latency(|outcome| outcome.energy(&GPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency over i7-3770",
+        printed: |design| Some(design.energy.cpu),
+        of: Source::Latency(|outcome| outcome.energy(&CPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency, GTX 980 TDP",
+        printed: |_| None,
+        of: Source::Powers(GPU.design_watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "power efficiency, i7-3770 TDP",
+        printed: |_| None,
+        of: Source::Powers(CPU.design_watts / ZCU102_WATTS),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency, GTX 980 TDP",
+        printed: |_| None,
+        of: Source::Latency(|outcome| outcome.energy_at(GPU.design_watts, &GPU)),
+    },
+    Figure {
+        table: |design| design.efficiencies,
+        name: "energy efficiency, i7-3770 TDP",
+        printed: |_| None,
+        of: Source::Latency(|outcome| outcome.energy_at(CPU.design_watts, &CPU)),
+    },
+    Figure {
+        table: |_| "eq 6.5",
+        name: "whole step over GTX 980's",
+        printed: |design| Some(design.whole_step),
+        of: Source::Latency(Outcome::whole_step),
+    },
+];
+
+fn against(scene: &Scene) -> Table {
+    let mut table = Table::new(
+        "comparison",
+        "Against the thesis' GPU and CPU (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)",
+        &[
+            ("profile", "profile"),
+            ("table", "table"),
+            ("figure", "figure"),
+            ("thesis", "thesis"),
+            ("recomputed", "recomputed"),
+            ("packed_unlimited", "ours"),
+            ("difference_percent", "diff."),
+            ("streamed_unlimited", "streamed"),
+            ("streamed_peak", "17.07 GB/s"),
+            ("streamed_sustained", "12.8 GB/s"),
+            ("kind", "kind"),
+        ],
+    );
+    for variant in &scene.variants {
+        for figure in &FIGURES {
+            add(&mut table, scene, variant, figure);
+        }
+    }
+    table.note(
+        "Recomputed: from the thesis' own cycles, clock and powers, unrounded. Ours: packed records \
+         without a wait for memory, as the thesis counts; then records as streamed, at unlimited, 17.07 and \
+         12.8 GB/s. Time and power of GPU and CPU, the board's 15 W and the share of 60 % in equation \
+         6.5 are the thesis'; no figure was measured here.",
+    );
+    table.note(format!(
+        "TDP: with the {} and {} W that T6.2 and T6.3 print for the same GPU and CPU, in place of \
+         the {} and {} W that the thesis divides by.",
+        GPU.design_watts, CPU.design_watts, GPU.watts, CPU.watts
+    ));
+    table.note(
+        "The thesis divides energies that it has rounded to two digits; 133 W over 15 W is 8.87, not \
+         8.67. Its Figures 6.1 and 6.2 chart its first design, naive, and its text prints no numbers of \
+         it. Ours is a lower bound of it: the thesis converts contacts in a kernel of its own, whose rows go \
+         through memory, ours within the passes.",
+    );
+    table
+}
+
+fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
+    let design = Design::of(variant.profile);
+    let number = |value| Cell::Number(value, 2);
+    let printed = design.and_then(figure.printed);
+    let (recomputed, ours, kind) = match figure.of {
+        Source::Powers(found) => {
+            // Every figure of the row is the thesis'.
+            if design.is_none() {
+                return;
+            }
+            (Some(found), None, Kind::Recorded)
+        }
+        Source::Latency(of) => {
+            let ms = |design: &Design| design.cycles as f64 / f64::from(design.profile.clock_khz);
+            let recomputed = design.map(|design| of(&Outcome { ms: ms(design) }));
+            let ours = |records, bandwidth| {
+                let time = StepTime::new(variant, records, &scene.step, bandwidth);
+                of(&Outcome { ms: time.seconds * 1e3 })
+            };
+            let all = [
+                ours(Records::Packed, Bandwidth::Unlimited),
+                ours(Records::Streamed, Bandwidth::Unlimited),
+                ours(Records::Streamed, Bandwidth::ZCU102_PEAK),
+                ours(Records::Streamed, Bandwidth::ZCU102_SUSTAINED),
+            ];
+            (recomputed, Some(all), Kind::Modelled)
+        }
+    };
+    let off = match (printed, ours, recomputed) {
+        (Some(printed), Some([packed, ..]), _) => scene.difference(packed, printed),
+        (Some(printed), None, Some(recomputed)) => difference(recomputed, printed),
+        _ => Cell::Missing,
+    };
+    let [packed, unlimited, peak, sustained] =
+        ours.map_or([const { Cell::Missing }; 4], |ours| ours.map(number));
+    table.row([
+        text(variant.profile.name),
+        text(design.map_or("-", figure.table)),
+        text(figure.name),
+        printed.map_or(Cell::Missing, number),
+        recomputed.map_or(Cell::Missing, number),
+        packed,
+        off,
+        unlimited,
+        peak,
+        sustained,
+        kind.cell(),
+    ]);
+}

@@ -1,0 +1,45 @@
+//! The input of the model: a step, profiles, bandwidths.
+
+use crate::estimate::{StepShape, thesis};
+use bitstream_model::Bandwidth;
+use pgs_interface::profile::Variant;
+
+use crate::table::Cell;
+
+/// The subject of the tables.
+#[derive(Debug, Clone)]
+pub(crate) struct Scene {
+    pub(super) step: StepShape,
+    pub(super) variants: Vec<Variant>,
+    pub(super) bandwidths: Vec<Bandwidth>,
+}
+
+impl Scene {
+    /// Whether the step is the thesis', so that its figures can be compared with ours.
+    pub(super) fn is_thesis_step(&self) -> bool {
+        self.step == thesis::step()
+    }
+
+    /// The deviation of our figure from the thesis', percent.
+    pub(super) fn difference(&self, ours: f64, thesis: f64) -> Cell {
+        if self.is_thesis_step() { difference(ours, thesis) } else { Cell::Missing }
+    }
+}
+
+/// The deviation of a figure from another one, percent.
+pub(super) fn difference(ours: f64, theirs: f64) -> Cell {
+    Cell::Difference((ours / theirs - 1.0) * 100.0)
+}
+
+pub(super) fn mib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
+}
+
+/// MiB with the two digits that the thesis prints: figures that round to the same digits are equal.
+pub(super) fn printed_mib(bytes: u64) -> f64 {
+    (mib(bytes) * 100.0).round() / 100.0
+}
+
+pub(super) fn yes_or_no(yes: bool) -> &'static str {
+    if yes { "yes" } else { "no" }
+}

@@ -1,0 +1,163 @@
+//! The tables of a step's cycles and times.
+
+use crate::estimate::thesis::recorded::{Design, MEMORY_BANDWIDTH};
+use crate::estimate::{MemoryUse, Records, StepCycles, StepTime, Window};
+use bitstream_model::Bandwidth;
+use pgs_interface::profile::{Inertia, Variant};
+
+use super::scene::{Scene, difference, mib, yes_or_no};
+use crate::table::{Cell, Kind, Table, text};
+use pgs_command::options::bandwidth::bandwidth_text;
+
+pub(super) fn tables(scene: &Scene) -> Vec<Table> {
+    vec![cycles(scene), times(scene), world_inertia(scene)]
+}
+
+fn cycles(scene: &Scene) -> Table {
+    let mut table = Table::new(
+        "cycles",
+        "Cycles of a step by formula (T6.4, T6.8)",
+        &[
+            ("profile", "profile"),
+            ("records", "records"),
+            ("load", "load"),
+            ("pass", "one pass"),
+            ("fill", "fill"),
+            ("integration", "integration"),
+            ("integration_fill", "its fill"),
+            ("total", "total"),
+            ("thesis", "thesis"),
+            ("difference_percent", "difference"),
+            ("kind", "kind"),
+        ],
+    );
+    for variant in &scene.variants {
+        let design = Design::of(variant.profile);
+        for records in Records::ALL {
+            let cycles = StepCycles::new(variant, records, &scene.step);
+            table.row([
+                text(variant.profile.name),
+                text(records.name()),
+                Cell::Whole(cycles.load),
+                Cell::Whole(cycles.pass),
+                Cell::Whole(cycles.fill),
+                Cell::Whole(cycles.integration()),
+                Cell::Whole(cycles.integration_fill),
+                Cell::Whole(cycles.total),
+                design.map_or(Cell::Missing, |design| Cell::Whole(design.cycles)),
+                design.map_or(Cell::Missing, |design| {
+                    scene.difference(cycles.total as f64, design.cycles as f64)
+                }),
+                Kind::Modelled.cell(),
+            ]);
+        }
+    }
+    table.note(format!(
+        "One formula for every profile that runs one pass after the other: load + {} passes + fill + integration, the longer of poses in \
+         and results out, + its fill, from the last body in to the end of the step. A step that stalls on hazards takes longer.",
+        scene.step.passes()
+    ));
+    if scene.variants.iter().any(|variant| Window::of(variant.profile).is_some()) {
+        table.note(
+            "Where the collisions stream once, all passes run in parallel: \"one pass\" has the cycles of all \
+             passes, and \"fill\" is the lag of the last pass behind the first. Load and integration run in \
+             parallel, too.",
+        );
+    }
+    table.note(
+        "Packed: numbers without padding, as the thesis counts them. Streamed: beats and padding as \
+         they travel; a result has position, orientation and both velocities, 13 numbers where the \
+         thesis counts 6.",
+    );
+    table
+}
+
+fn times(scene: &Scene) -> Table {
+    let mut table = Table::new(
+        "time",
+        "Time of a step by memory bandwidth",
+        &[
+            ("profile", "profile"),
+            ("records", "records"),
+            ("bandwidth", "bandwidth"),
+            ("bytes", "bytes moved"),
+            ("ms", "ms"),
+            ("load_limit", "load by"),
+            ("pass_limit", "passes by"),
+            ("integration_limit", "integration by"),
+            ("thesis_ms", "thesis ms"),
+            ("difference_percent", "difference"),
+            ("kind", "kind"),
+        ],
+    );
+    for variant in &scene.variants {
+        let design = Design::of(variant.profile);
+        for records in Records::ALL {
+            for bandwidth in &scene.bandwidths {
+                let time = StepTime::new(variant, records, &scene.step, *bandwidth);
+                // The thesis' cycles contain no memory waits, and it states a bandwidth.
+                let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH];
+                let design = design.filter(|_| stated.contains(bandwidth));
+                table.row([
+                    text(variant.profile.name),
+                    text(records.name()),
+                    text(bandwidth_text(*bandwidth)),
+                    Cell::Whole(time.bytes),
+                    Cell::Number(time.seconds * 1e3, 3),
+                    text(time.load.limit.name()),
+                    text(time.pass.limit.name()),
+                    text(time.integration.limit.name()),
+                    design.map_or(Cell::Missing, |design| Cell::Number(design.latency_ms, 2)),
+                    design.map_or(Cell::Missing, |design| {
+                        scene.difference(time.seconds * 1e3, design.latency_ms)
+                    }),
+                    Kind::Modelled.cell(),
+                ]);
+            }
+        }
+    }
+    table.note(
+        "17.07 GB/s is the peak of the ZCU102 preset, 12.8 GB/s what a published measurement \
+         sustains. The thesis states 16 GB/s for its memory (§5.4.2), a pass of its float design needs \
+         15.4, and its times contain no wait for memory. The 2,062,697 cycles of its float design \
+         at 275 MHz are 7.501 ms where it prints 7.49.",
+    );
+    table
+}
+
+fn world_inertia(scene: &Scene) -> Table {
+    let mut table = Table::new(
+        "inertia",
+        "What the world inertia of every body costs, records as streamed",
+        &[
+            ("profile", "profile"),
+            ("cycles_without", "cycles"),
+            ("cycles_with", "with it"),
+            ("difference_percent", "difference"),
+            ("mib_without", "MiB on chip"),
+            ("mib_with", "with it"),
+            ("fit", "fits"),
+            ("kind", "kind"),
+        ],
+    );
+    for variant in &scene.variants {
+        let both = [Inertia::Isotropic, Inertia::World].map(|inertia| {
+            let variant = Variant { inertia, ..*variant };
+            let cycles = StepCycles::new(&variant, Records::Streamed, &scene.step).total;
+            let memory = MemoryUse::new(&variant, scene.step.bodies, scene.step.collisions);
+            (cycles, memory)
+        });
+        let [(without, memory_without), (with, memory_with)] = both;
+        table.row([
+            text(variant.profile.name),
+            Cell::Whole(without),
+            Cell::Whole(with),
+            difference(with as f64, without as f64),
+            Cell::Number(mib(memory_without.block_ram()), 2),
+            Cell::Number(mib(memory_with.block_ram()), 2),
+            text(yes_or_no(memory_with.fits())),
+            Kind::Modelled.cell(),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,48 @@
+//! The cost of a warm start, in the way that the specification has chosen and in the other one.
+
+use crate::estimate::{WarmCost, WarmStart};
+
+use super::scene::Scene;
+use crate::table::{Cell, Kind, Table, text};
+
+/// The table, if one of the profiles has a warm start.
+pub(super) fn tables(scene: &Scene) -> Vec<Table> {
+    let mut table = Table::new(
+        "warm",
+        "Warm start: impulses in and out",
+        &[
+            ("profile", "profile"),
+            ("applied", "impulses are applied"),
+            ("cycles", "cycles without"),
+            ("more_cycles_percent", "cycles more"),
+            ("bytes", "bytes without"),
+            ("more_bytes_percent", "bytes more"),
+            ("out_percent", "out of it"),
+            ("kind", "kind"),
+        ],
+    );
+    for variant in &scene.variants {
+        for (way, name) in [
+            (WarmStart::OwnPass, "in a pass in front of each kind"),
+            (WarmStart::FirstPass, "in the first pass (not built)"),
+        ] {
+            let Some(cost) = WarmCost::new(variant, way, &scene.step) else { continue };
+            let percent = |part: u64, of: u64| Cell::Share(part as f64 / of.max(1) as f64 * 100.0);
+            table.row([
+                text(variant.profile.name),
+                text(name),
+                Cell::Whole(cost.cycles),
+                percent(cost.more_cycles, cost.cycles),
+                Cell::Whole(cost.bytes),
+                percent(cost.more_in + cost.more_out, cost.bytes),
+                percent(cost.more_out, cost.bytes),
+                Kind::Modelled.cell(),
+            ]);
+        }
+    }
+    table.note(
+        "Applied at each collision's own turn in the first pass, impulses cost next to nothing and do not \
+         hold a pile: a row is solved before its neighbours' impulses are in, and takes its own back.",
+    );
+    if table.rows.is_empty() { Vec::new() } else { vec![table] }
+}

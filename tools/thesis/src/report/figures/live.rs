@@ -1,0 +1,115 @@
+//! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
+
+use crate::estimate::thesis::BODIES;
+use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve};
+
+use super::super::step::{DEPTH, Step};
+use crate::experiment::Part;
+use crate::figure::Figure;
+use crate::figure::{Axis, Drawn, Series, lines};
+use crate::index::{Origin, Row};
+use crate::study::recorded::{MOST_ALIVE, MOST_ALIVE_PERCENT};
+use pgs_command::failure::Failure;
+use pgs_command::numbers::grouped;
+
+/// Ranges of slots; a curve shows the maximum of each.
+const RANGES: usize = 400;
+
+/// The largest number of each range of slots.
+fn thinned(alive: &[u32]) -> Vec<(f64, f64)> {
+    let each = alive.len().div_ceil(RANGES).max(1);
+    let mut from = 0.0;
+    let mut points = Vec::new();
+    for range in alive.chunks(each) {
+        points.push((from, f64::from(range.iter().copied().max().unwrap_or(0))));
+        from += f64::from(u32::try_from(range.len()).unwrap_or(u32::MAX));
+    }
+    points
+}
+
+/// The thesis' number and share, and the share that its numbers give.
+fn recorded_share() -> String {
+    let [most, bodies] = [MOST_ALIVE.into(), BODIES].map(grouped);
+    let share = 100.0 * f64::from(MOST_ALIVE) / BODIES as f64;
+    format!("{most} of {bodies} ({MOST_ALIVE_PERCENT} %; {most} / {bodies} is {share:.2} %)")
+}
+
+pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
+    let mut buffers = InputBuffers::new();
+    buffers.gather(&step.bodies, &step.collisions, &step.shapes);
+    let input = buffers.input();
+    let refused = |error: OrderError| Failure::input(error);
+    let window = IssueWindow::new(DEPTH, 1).map_err(refused)?;
+    let mut orderer = Orderer::new();
+    let mut series = Vec::new();
+    let mut most = Vec::new();
+    for (name, order) in [
+        ("as given", Order::AsGiven),
+        ("Algorithm 3, ties by the lowest index", Order::BodyByBody(Ties::LowestIndex)),
+        ("Algorithm 3, ties by the oldest", Order::BodyByBody(Ties::Oldest)),
+        ("Algorithm 3, ties by the newest", Order::BodyByBody(Ties::Newest)),
+        ("hazard-free (ours)", Order::HazardFree),
+    ] {
+        orderer.order(&input, order, window).map_err(refused)?;
+        let alive = live_curve(orderer.schedule(), &input, window).map_err(refused)?;
+        most.push((name, alive.iter().copied().max().unwrap_or(0)));
+        series.push(Series::new(name, Drawn::Line, thinned(&alive)));
+    }
+    let end =
+        series.iter().flat_map(|series| series.points.last()).map(|at| at.0).fold(1.0, f64::max);
+    let recorded = f64::from(MOST_ALIVE);
+    series.push(Series::new(
+        format!("{}, the thesis' largest", grouped(MOST_ALIVE.into())),
+        Drawn::Dashes,
+        vec![(0.0, recorded), (end, recorded)],
+    ));
+    let figure = Figure {
+        id: "figure-4-13",
+        thesis: "§4.7, Figure 4.13",
+        title: "Bodies to keep on chip along the sorted collisions".to_owned(),
+        svg: lines(Axis::linear("issue slot"), Axis::log("bodies alive"), &series),
+        caption: format!(
+            "A body is alive from its first collision to its last. The step is {}; the thesis' own is not \
+             published, and its Algorithm 3 does not say how ties are broken.",
+            step.name
+        ),
+        origin: Origin::Measured,
+        playback: None,
+    };
+    let ours: Vec<String> = most
+        .iter()
+        .skip(1)
+        .map(|(name, most)| {
+            format!("{} ({})", grouped(u64::from(*most)), name.replace("Algorithm 3, ", ""))
+        })
+        .collect();
+    let moving = input.moving.iter().filter(|moving| **moving).count();
+    let row = Row {
+        thesis: format!("{}, Algorithm 3", figure.thesis),
+        subject: format!("most bodies alive of {}", grouped(moving as u64)),
+        recorded: recorded_share(),
+        ours: ours.join("; "),
+        origin: Origin::Measured,
+        command: step.order_command(),
+        shown: figure.id.to_owned(),
+    };
+    Ok(Part { figures: vec![figure], rows: vec![row], ..Part::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_recorded_share_is_printed_beside_the_one_that_its_numbers_give() {
+        assert_eq!(recorded_share(), "1,528 of 38,880 (3.85 %; 1,528 / 38,880 is 3.93 %)");
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_the_largest_of_each_range() {
+        let alive: Vec<u32> = (0..1000).map(|k| if k == 501 { 77 } else { 1 }).collect();
+        let points = thinned(&alive);
+        assert_eq!(points.len(), 334);
+        assert_eq!(points.iter().filter(|point| point.1 > 1.0).count(), 1);
+    }
+}

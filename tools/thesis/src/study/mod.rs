@@ -1,0 +1,12 @@
+//! Experiments that step a board, and measure again a claim of the thesis.
+
+pub(crate) mod determinism;
+pub(crate) mod half;
+pub(crate) mod ladder;
+pub(crate) mod recorded;
+mod run;
+pub(crate) mod split;
+mod spread;
+mod start;
+pub(crate) mod stopping;
+pub(crate) mod time_step;

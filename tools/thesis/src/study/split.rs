@@ -1,0 +1,358 @@
+//! The study `split`: the shares of collision search and collision response in a step (thesis §4.4: 40
+//! and 60 %), and the gain of the whole step when the response alone becomes faster (equation 6.5).
+//!
+//! Both shares are measured on this host, in processor time of one thread: the search is the detection
+//! of `pgs run`, the response is the yardstick, a sequential solver with Bullet's bits. The time of the
+//! board is modelled.
+
+use std::time::Duration;
+
+use crate::estimate::thesis::amdahl;
+use crate::estimate::thesis::recorded::{ACCELERATED_SHARE, CPU, DESIGNS, GPU};
+use clap::Args;
+use nix::time::{ClockId, clock_gettime};
+use scene::{Grid, Scene};
+use serde::Serialize;
+use yardstick::Yardstick;
+use zynq_pgs::emulation::Build;
+use zynq_pgs::{StepParameters, StepReport};
+
+use crate::experiment::{Measured, Part};
+use crate::session::Session;
+use crate::table::{Cell, Table, text};
+use pgs_command::board;
+use pgs_command::failure::{Cause, Failure};
+use pgs_command::numbers::grouped;
+use pgs_command::output::milliseconds;
+use pgs_command::pile;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs thesis split                      the thesis' scene
+  pgs thesis split --grid 12x12x12 --steps 90 --runs 15 --json
+
+Measured: medians over successive steps of a pile, in processor time of one thread, which a busy
+host changes less than time by the clock. Search is the detection of this project (a grid, then cubes
+against cubes), response the yardstick: a sequential scalar solver with Bullet's bits, that makes its
+rows, takes the passes and integrates, in memory that an unmeasured run has touched. Driver: time by
+the clock around the board's, for checks, order, packing and results. Modelled: the board's time, at
+the bandwidth that a ZCU102 sustains.
+
+Whole step: 1 / ((1 - p) + p / s) (thesis eq. 6.5), with s the factor of the response and p its
+share: the thesis' 0.6, or the measured one.";
+
+/// The experiment.
+pub(crate) static SPLIT: Measured<Options> = Measured {
+    id: "split",
+    thesis: "§4.4, equation 6.5",
+    about: "The shares of collision search and response in a step, and what a faster response gains",
+    opens_board: true,
+    run: |options, session| Ok(measure(options, session)?.part()),
+};
+
+/// Its arguments.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Options {
+    /// Cubes of the pile along each axis.
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t)]
+    pub(crate) grid: Grid,
+    /// Height of the lowest cubes above the ground at the start, m.
+    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    pub(crate) drop: f32,
+    /// Steps before the first measured one.
+    #[arg(long, value_name = "N", default_value_t = 45)]
+    pub(crate) steps: u32,
+    /// Measured steps.
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) runs: u32,
+}
+
+/// The shares, and the gains.
+#[derive(Debug, Serialize)]
+pub(crate) struct Outcome {
+    pub(crate) complete: bool,
+    pub(crate) grid: String,
+    pub(crate) drop_m: f32,
+    pub(crate) bodies: usize,
+    /// In the last measured step.
+    pub(crate) collisions: usize,
+    /// Medians; none if Ctrl-C came before the first measured step.
+    pub(crate) median: Option<Times>,
+    /// The response's share of search and response, from the medians.
+    pub(crate) response_share: Option<f64>,
+    /// The smallest and the largest share of a step.
+    pub(crate) response_share_range: Option<[f64; 2]>,
+    /// The thesis' share.
+    pub(crate) recorded_share: f64,
+    pub(crate) gains: Vec<Gain>,
+    pub(crate) samples: Vec<Times>,
+}
+
+/// Times of one step, ms.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct Times {
+    pub(crate) search_ms: f64,
+    pub(crate) response_ms: f64,
+    /// The driver's host time, by the clock.
+    pub(crate) driver_ms: f64,
+    /// Modelled.
+    pub(crate) board_ms: f64,
+}
+
+/// The gain of a whole step.
+#[derive(Debug, Serialize)]
+pub(crate) struct Gain {
+    pub(crate) response: String,
+    /// The factor of the response.
+    pub(crate) factor: f64,
+    pub(crate) whole_with_recorded_share: f64,
+    pub(crate) whole_with_measured_share: f64,
+    /// The thesis' own figure.
+    pub(crate) recorded: Option<f64>,
+}
+
+/// Steps the pile, and times each measured step's search and response.
+pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+    let Options { grid, drop, .. } = *options;
+    let build = Build { threads: Some(1), ..Build::default() };
+    let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
+    scene.set_threads(1);
+    session.watch(&mut opened);
+    let parameters = StepParameters::default();
+    session.expect(u64::from(options.steps) + u64::from(options.runs));
+    let mut samples = Vec::new();
+    let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, options.steps, || {
+        session.advance();
+        !session.is_interrupted()
+    })?;
+    for _ in 0..options.runs {
+        goes_on = goes_on && !session.is_interrupted();
+        if !goes_on {
+            break;
+        }
+        let search = spent(|| measured_search(&mut scene))?;
+        let response = respond(&scene, &parameters)?;
+        let (bodies, collisions) = scene.parts_mut();
+        let report = match opened.accelerator.step(bodies, collisions, &parameters) {
+            Ok(report) => report,
+            Err(error) if board::is_cancelled(&error) => break,
+            Err(error) => return Err(opened.failure(error)),
+        };
+        session.advance();
+        samples.push(Times {
+            search_ms: milliseconds(search),
+            response_ms: milliseconds(response),
+            driver_ms: milliseconds(driver(&report)),
+            board_ms: milliseconds(report.modelled_time()),
+        });
+    }
+    session.end();
+    let median = Times::median(&samples);
+    let shares: Vec<f64> = samples.iter().map(Times::response_share).collect();
+    let range = shares.iter().fold(None, |range: Option<[f64; 2]>, share| {
+        let [least, most] = range.unwrap_or([*share; 2]);
+        Some([least.min(*share), most.max(*share)])
+    });
+    Ok(Outcome {
+        complete: samples.len() as u64 == u64::from(options.runs),
+        grid: grid.to_string(),
+        drop_m: drop,
+        bodies: scene.bodies().len(),
+        collisions: scene.collisions().len(),
+        median,
+        response_share: median.as_ref().map(Times::response_share),
+        response_share_range: range,
+        recorded_share: ACCELERATED_SHARE,
+        gains: median.as_ref().map(gains).unwrap_or_default(),
+        samples,
+    })
+}
+
+/// The yardstick's time for the step.
+fn respond(scene: &Scene, parameters: &StepParameters) -> Result<Duration, Failure> {
+    let (shapes, bodies) = (scene.shapes(), scene.bodies());
+    let mut yardstick = Yardstick::new(shapes, bodies, scene.collisions(), parameters);
+    yardstick.solve();
+    spent(|| measured_response(&mut yardstick))
+}
+
+// `tools/scripts/a53-split.sh` counts the instructions of both functions by their names.
+
+#[inline(never)]
+fn measured_search(scene: &mut Scene) {
+    scene.detect();
+}
+
+#[inline(never)]
+fn measured_response(yardstick: &mut Yardstick) {
+    yardstick.solve();
+}
+
+/// Processor time that this thread spends.
+fn spent(act: impl FnOnce()) -> Result<Duration, Failure> {
+    let now = || {
+        clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).map(Duration::from).map_err(|error| {
+            Failure::new(Cause::Hardware, error)
+                .about("the processor time of a thread cannot be read")
+                .next("run the study on another system")
+        })
+    };
+    let begin = now()?;
+    act();
+    Ok(now()?.saturating_sub(begin))
+}
+
+/// The driver's host time, without the wait for the board.
+fn driver(report: &StepReport) -> Duration {
+    let host = &report.host;
+    host.validate + host.order + host.pack + host.start + host.unpack + host.commit
+}
+
+impl Times {
+    fn response_share(&self) -> f64 {
+        self.response_ms / (self.search_ms + self.response_ms)
+    }
+
+    /// The median of each time; none without samples.
+    fn median(samples: &[Self]) -> Option<Self> {
+        let of = |time: fn(&Self) -> f64| {
+            let mut times: Vec<f64> = samples.iter().map(time).collect();
+            times.sort_unstable_by(f64::total_cmp);
+            times.get(times.len() / 2).copied()
+        };
+        Some(Self {
+            search_ms: of(|times| times.search_ms)?,
+            response_ms: of(|times| times.response_ms)?,
+            driver_ms: of(|times| times.driver_ms)?,
+            board_ms: of(|times| times.board_ms)?,
+        })
+    }
+}
+
+/// The gains by the thesis' factors, and by the ones of these times.
+fn gains(times: &Times) -> Vec<Gain> {
+    let share = times.response_share();
+    let gain = |response: String, factor: f64, recorded| Gain {
+        response,
+        factor,
+        whole_with_recorded_share: amdahl(ACCELERATED_SHARE, factor),
+        whole_with_measured_share: amdahl(share, factor),
+        recorded,
+    };
+    let thesis = DESIGNS.iter().flat_map(|design| {
+        [(GPU, Some(design.whole_step)), (CPU, None)].map(|(platform, recorded)| {
+            let name = format!("{} instead of {} (recorded)", design.profile.name, platform.name);
+            gain(name, platform.latency_ms / design.latency_ms, recorded)
+        })
+    });
+    let board = times.response_ms / times.board_ms;
+    let with_driver = times.response_ms / (times.board_ms + times.driver_ms);
+    let ours = [
+        gain("float (modelled) instead of this host".to_owned(), board, None),
+        gain("the same with the driver's time".to_owned(), with_driver, None),
+    ];
+    thesis.chain(ours).collect()
+}
+
+impl Outcome {
+    /// The facts and tables of the outcome.
+    fn part(&self) -> Part {
+        let Self { grid, drop_m, bodies, collisions, samples, .. } = self;
+        let (bodies, collisions) = (grouped(*bodies as u64), grouped(*collisions as u64));
+        let pile = format!(
+            "{grid} cubes dropped from {drop_m} m: {bodies} bodies, {collisions} collisions, median of \
+             {} steps, one thread",
+            samples.len()
+        );
+        let tables = self.median.iter().flat_map(|times| [times.table(), self.of_gains()]);
+        let mut part = Part::of(tables.collect()).with(self);
+        part.complete = self.complete;
+        part.fact("pile", pile);
+        if let Some((times, [least, most])) = self.median.as_ref().zip(self.response_share_range) {
+            let text = format!(
+                "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); thesis \
+                 {:.0} % (recorded)",
+                100.0 * times.response_share(),
+                100.0 * least,
+                100.0 * most,
+                100.0 * self.recorded_share,
+            );
+            part.fact("share", text);
+        }
+        part
+    }
+
+    fn of_gains(&self) -> Table {
+        let mut table = Table::new(
+            "gains",
+            "The whole step by equation 6.5",
+            &[
+                ("response", "response"),
+                ("factor", "factor\ns"),
+                ("whole_with_recorded_share", "whole\np = 0.6"),
+                ("whole_with_measured_share", "whole\nmeasured"),
+                ("recorded", "thesis"),
+            ],
+        );
+        for gain in &self.gains {
+            table.row([
+                text(&gain.response),
+                Cell::Number(gain.factor, 2),
+                Cell::Number(gain.whole_with_recorded_share, 2),
+                Cell::Number(gain.whole_with_measured_share, 2),
+                Cell::known(gain.recorded, |gain| Cell::Number(gain, 2)),
+            ]);
+        }
+        table
+    }
+}
+
+impl Times {
+    fn table(&self) -> Table {
+        let columns = [("part", "one step"), ("ms", "time\nms"), ("share_percent", "share\n%")];
+        let mut table = Table::new("shares", "Times of one step", &columns);
+        let whole = self.search_ms + self.response_ms;
+        for (name, time, shared) in [
+            ("search (measured)", self.search_ms, true),
+            ("response (measured, yardstick)", self.response_ms, true),
+            ("driver of the board (measured)", self.driver_ms, false),
+            ("board (modelled)", self.board_ms, false),
+        ] {
+            let share = shared.then_some(100.0 * time / whole);
+            let share = Cell::known(share, |share| Cell::Number(share, 1));
+            table.row([text(name), Cell::Number(time, 2), share]);
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(search_ms: f64, response_ms: f64) -> Times {
+        Times { search_ms, response_ms, driver_ms: 5.0, board_ms: 10.0 }
+    }
+
+    #[test]
+    fn the_thesis_shares_give_the_thesis_gains() {
+        let gains = gains(&times(40.0, 60.0));
+        for (gain, expected) in [(&gains[0], 1.37), (&gains[2], 1.48)] {
+            assert!((gain.whole_with_measured_share - expected).abs() < 0.005, "{gain:?}");
+            assert_eq!(gain.recorded, Some(expected));
+        }
+        // By hand: 60 ms become 10, and 15 with the driver's time.
+        let whole: Vec<f64> =
+            gains[4..].iter().map(|gain| gain.whole_with_measured_share).collect();
+        assert!((whole[0] - 100.0 / 50.0).abs() < 1e-12 && (whole[1] - 100.0 / 55.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn each_time_has_a_median_of_its_own() {
+        let samples = [times(1.0, 9.0), times(2.0, 8.0), times(3.0, 7.0)];
+        let median = Times::median(&samples).expect("samples");
+        assert_eq!((median.search_ms, median.response_ms), (2.0, 8.0));
+        assert!(Times::median(&[]).is_none());
+    }
+}

@@ -1,0 +1,129 @@
+//! The tables of the residuals after each number of passes, and of the passes of each rule.
+
+use super::residual::Residuals;
+use super::{Outcome, Pass, Rules};
+use crate::experiment::Part;
+use crate::table::{Cell, Table};
+use pgs_command::numbers::{grouped, number};
+
+/// A table of the residuals after some passes; `heads` are of the passes and of the third residual.
+fn residuals(
+    (id, title): (&'static str, &str),
+    [passes_head, third]: [&'static str; 2],
+    passes: &[Pass],
+    of: impl Fn(&Residuals) -> [f64; 3],
+) -> Table {
+    let mut table = Table::new(
+        id,
+        title,
+        &[
+            ("passes", passes_head),
+            ("rms_m_s", "residual\nrms m/s"),
+            ("largest_m_s", "largest\nm/s"),
+            ("third_rms_m_s", third),
+            ("largest_change_n_s", "change\nN s"),
+            ("largest_share", "share"),
+        ],
+    );
+    for pass in shown(passes) {
+        let [rms, largest, third] = of(&pass.residuals).map(Cell::Digits);
+        table.row([
+            Cell::Whole(pass.passes.into()),
+            rms,
+            largest,
+            third,
+            Cell::known(pass.largest_change_n_s, Cell::Digits),
+            Cell::known(pass.largest_share, Cell::Digits),
+        ]);
+    }
+    table
+}
+
+impl Outcome {
+    /// The facts and tables of the outcome.
+    pub(super) fn part(&self) -> Part {
+        let contact = residuals(
+            ("contact", "Contact passes"),
+            ["contact\npasses", "Fischer-B.\nrms m/s"],
+            &self.contact,
+            |Residuals { contact, fischer_burmeister, .. }| {
+                [contact.rms, contact.largest, fischer_burmeister.rms]
+            },
+        );
+        let friction = residuals(
+            ("friction", "Friction passes behind the step's own contact passes"),
+            ["friction\npasses", "contacts\nrms m/s"],
+            &self.friction,
+            |Residuals { friction, contact, .. }| [friction.rms, friction.largest, contact.rms],
+        );
+        let mut part = Part::of(vec![contact, friction, self.rules()]).with(self);
+        part.complete = self.complete;
+        let step = format!(
+            "{}: {} bodies, {} collisions, spin damping {}",
+            self.step,
+            grouped(self.bodies as u64),
+            grouped(self.collisions as u64),
+            self.spin_damping,
+        );
+        part.fact("step", step);
+        if let Some(Pass { residuals: Residuals { contact, friction, .. }, .. }) = &self.fixed {
+            let text = format!(
+                "{} + {} passes leave {} m/s at the contacts and {} m/s at the tangents (root mean \
+                 square), {} and {} m/s at most",
+                self.contact_iterations,
+                self.friction_iterations,
+                number(contact.rms),
+                number(friction.rms),
+                number(contact.largest),
+                number(friction.largest),
+            );
+            part.fact("fixed", text);
+        }
+        part
+    }
+
+    fn rules(&self) -> Table {
+        let mut table = Table::new(
+            "rules",
+            "Passes until a rule holds",
+            &[
+                ("tolerance", "tolerance"),
+                ("contact_residual", "contact\nresidual"),
+                ("contact_change", "contact\nchange"),
+                ("contact_each", "contact\neach"),
+                ("friction_residual", "friction\nresidual"),
+                ("friction_change", "friction\nchange"),
+                ("friction_each", "friction\neach"),
+            ],
+        );
+        for tolerance in &self.tolerances {
+            let cells = |rules: Rules| {
+                [rules.residual, rules.largest_change, rules.each_change]
+                    .map(|passes| Cell::known(passes, |passes| Cell::Whole(passes.into())))
+            };
+            let mut row = vec![Cell::Digits(tolerance.tolerance)];
+            row.extend(cells(tolerance.contact));
+            row.extend(cells(tolerance.friction));
+            table.row(row);
+        }
+        let most = |passes: &[Pass]| passes.last().map_or(0, |pass| pass.passes);
+        table.note(format!(
+            "A missing number is above the {} contact and {} friction passes that were measured.",
+            most(&self.contact),
+            most(&self.friction)
+        ));
+        table
+    }
+}
+
+/// The first passes, and later ones ever further apart.
+fn shown(passes: &[Pass]) -> impl Iterator<Item = &Pass> {
+    let last = passes.last().map_or(0, |pass| pass.passes);
+    passes.iter().filter(move |pass| {
+        let number = pass.passes;
+        number <= 8
+            || number == last
+            || number.is_power_of_two()
+            || number % 3 == 0 && (number / 3).is_power_of_two()
+    })
+}

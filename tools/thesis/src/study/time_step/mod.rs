@@ -1,0 +1,357 @@
+//! The study `time-step`: the trade-off of speed against accuracy that the time step decides (thesis
+//! §2.1, Figure 2.2).
+//!
+//! Two scenes, each for the same simulated time: a body in free flight, whose exact path is known, and
+//! a pile of cubes. The board integrates both.
+
+mod show;
+
+use clap::Args;
+use scene::{Grid, Scene, SceneOptions};
+use serde::Serialize;
+use zynq_pgs::emulation::Build;
+use zynq_pgs::{Body, Pose, StepParameters, Velocity};
+
+use crate::experiment::Measured;
+use crate::session::Session;
+use pgs_command::board::{self, OpenBoard};
+use pgs_command::failure::Failure;
+use pgs_command::options::scenes;
+
+const EXAMPLES: &str = "\
+Examples:
+  pgs thesis time-step
+  pgs thesis time-step --grid 8x8x8 --seconds 3 --iterations 10
+  pgs thesis time-step --json > time-step.json
+
+Free flight: explicit Euler moves by the velocity at the start of the step, symplectic Euler by the
+one at its end. The board is explicit (position before gravity). With contacts it is symplectic one
+step late: the velocity that moves a body has passed the solver and has the gravity of the step
+before. Pile: deepest penetration of the whole run and at its end, kinetic energy without the
+gravity of the last step, and the mean distance of the bodies from those of the shortest time step.
+
+Damping acts once a step, and the share of a penetration that a step removes is the same for each
+time step: a pile with a short time step is damped and pushed apart more often a second.";
+
+/// Steps a second, from the shortest time step to the longest: each a multiple of the last.
+const RATES: [u16; 6] = [480, 240, 120, 60, 30, 15];
+/// Samples a second of a run.
+const SAMPLES: u16 = 15;
+/// Velocity of the body in flight at the start, m/s.
+const THROWN: [f32; 3] = [3.0, 8.0, 0.0];
+/// Its height, m.
+const HEIGHT: f32 = 50.0;
+
+/// The experiment.
+pub(crate) static TIME_STEP: Measured<Options> = Measured {
+    id: "time-step",
+    thesis: "§2.1.1, Figure 2.2",
+    about: "A body in flight and a pile with time steps from 1/480 s to 1/15 s",
+    opens_board: true,
+    run: |options, session| Ok(measure(options, session)?.part()),
+};
+
+/// Its arguments.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Options {
+    /// Cubes of the pile along each axis.
+    #[arg(long, value_name = "NXxNYxNZ", default_value = "5x5x5")]
+    pub(crate) grid: Grid,
+    /// Height of the lowest cubes above the ground at the start, m.
+    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    pub(crate) drop: f32,
+    /// Simulated time, s.
+    #[arg(long, value_name = "S", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=60))]
+    pub(crate) seconds: u16,
+    /// Contact iterations, and the same number of friction iterations.
+    #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=255))]
+    pub(crate) iterations: u32,
+}
+
+/// The same simulated time in steps of several lengths.
+#[derive(Debug, Serialize)]
+pub(crate) struct Outcome {
+    pub(crate) complete: bool,
+    pub(crate) grid: String,
+    pub(crate) drop_m: f32,
+    pub(crate) seconds: u16,
+    pub(crate) iterations: u32,
+    pub(crate) rows: Vec<Row>,
+}
+
+/// One time step.
+#[derive(Debug, Serialize)]
+pub(crate) struct Row {
+    pub(crate) steps_per_second: u16,
+    pub(crate) time_step_s: f64,
+    pub(crate) flight: Flight,
+    pub(crate) pile: Pile,
+}
+
+/// Distance of a body in free flight from its exact position at the end, m.
+#[derive(Debug, Serialize)]
+pub(crate) struct Flight {
+    pub(crate) explicit_m: f64,
+    pub(crate) symplectic_m: f64,
+    pub(crate) board_m: f64,
+}
+
+/// A pile after the simulated time, and the cost of its steps.
+#[derive(Debug, Serialize)]
+pub(crate) struct Pile {
+    pub(crate) steps: u32,
+    pub(crate) deepest_m: f64,
+    pub(crate) deepest_at_end_m: f64,
+    /// Without the gravity that the last step has added.
+    pub(crate) kinetic_at_end_j: f64,
+    pub(crate) kinetic_most_j: f64,
+    /// Mean over the bodies; 0 for the shortest time step.
+    pub(crate) distance_from_shortest_m: f64,
+    pub(crate) cycles_per_second: f64,
+    /// Time on the board for a simulated second.
+    pub(crate) board_ms_per_second: f64,
+    pub(crate) samples: Vec<Sample>,
+}
+
+/// The pile at one time.
+#[derive(Debug, Serialize)]
+pub(crate) struct Sample {
+    pub(crate) seconds: f64,
+    pub(crate) deepest_m: f64,
+    pub(crate) kinetic_j: f64,
+    pub(crate) potential_j: f64,
+}
+
+/// Takes the steps of every length.
+pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+    scenes::check_rows(options.grid)?;
+    let mut opened = board::open(&session.common, &Build::default())?.stated();
+    session.watch(&mut opened);
+    let scene = scene(options)?;
+    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+    let seconds = u32::from(options.seconds);
+    session.expect(RATES.iter().map(|rate| 2 * u64::from(*rate) * u64::from(seconds)).sum());
+    let mut rows: Vec<Row> = Vec::new();
+    let mut shortest = None;
+    for rate in RATES {
+        let parameters = StepParameters::default()
+            .with_contact_iterations(options.iterations)
+            .with_friction_iterations(options.iterations)
+            .with_time_step(1.0 / f32::from(rate));
+        let mut run = Run { opened: &mut opened, session, parameters, rate, seconds };
+        let Some(flight) = run.fly(&scene)? else { break };
+        let Some((pile, ends)) = run.pile(options, shortest.as_deref())? else { break };
+        shortest.get_or_insert(ends);
+        let time_step_s = 1.0 / f64::from(rate);
+        rows.push(Row { steps_per_second: rate, time_step_s, flight, pile });
+    }
+    session.end();
+    Ok(Outcome {
+        complete: rows.len() == RATES.len(),
+        grid: options.grid.to_string(),
+        drop_m: options.drop,
+        seconds: options.seconds,
+        iterations: options.iterations,
+        rows,
+    })
+}
+
+fn scene(options: &Options) -> Result<Scene, Failure> {
+    let Options { grid, drop, .. } = *options;
+    Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).map_err(Failure::input)
+}
+
+/// A pile's measures, and its positions at the end.
+type Ended = (Pile, Vec<[f64; 3]>);
+
+/// The runs with one time step.
+struct Run<'a> {
+    opened: &'a mut OpenBoard,
+    session: &'a Session,
+    parameters: StepParameters,
+    rate: u16,
+    seconds: u32,
+}
+
+impl Run<'_> {
+    fn steps(&self) -> u32 {
+        u32::from(self.rate) * self.seconds
+    }
+
+    /// Throws a body of the scene's shape; none if Ctrl-C ended it.
+    fn fly(&mut self, scene: &Scene) -> Result<Option<Flight>, Failure> {
+        let position = [0.0, HEIGHT, 0.0];
+        let pose = Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] };
+        let velocity = Velocity { linear: THROWN, angular: [0.0; 3] };
+        let shape = scene.bodies().last().map_or(0, |body| body.shape);
+        let mut bodies = vec![Body { pose, velocity, shape }];
+        for _ in 0..self.steps() {
+            let none: &[zynq_pgs::Collision] = &[];
+            let stepped = self.opened.accelerator.step(&mut bodies, none, &self.parameters);
+            match stepped {
+                Ok(_) => self.session.advance(),
+                Err(error) if board::is_cancelled(&error) => return Ok(None),
+                Err(error) => return Err(self.opened.failure(error)),
+            }
+        }
+        let wide = |v: [f32; 3]| v.map(f64::from);
+        let thrown = Thrown {
+            position: wide(position),
+            speed: wide(THROWN),
+            gravity: wide(self.parameters.gravity),
+        };
+        let exact = thrown.exact(self.seconds.into());
+        let at_end = bodies.first().map_or([f64::NAN; 3], |body| wide(body.pose.position));
+        Ok(Some(Flight {
+            explicit_m: distance(thrown.euler(self.rate, self.steps(), Euler::Explicit), exact),
+            symplectic_m: distance(thrown.euler(self.rate, self.steps(), Euler::Symplectic), exact),
+            board_m: distance(at_end, exact),
+        }))
+    }
+
+    /// Drops the pile; its measures and the positions at the end, or none if Ctrl-C ended it.
+    fn pile(
+        &mut self,
+        options: &Options,
+        shortest: Option<&[[f64; 3]]>,
+    ) -> Result<Option<Ended>, Failure> {
+        let mut scene = scene(options)?;
+        let (mut samples, mut cycles, mut board) = (Vec::new(), 0_u64, 0.0);
+        let (mut deepest, mut kinetic_most) = (0.0_f64, 0.0_f64);
+        let mut at_end = self.sample(&mut scene, 0);
+        for step in 1..=self.steps() {
+            let (bodies, collisions) = scene.parts_mut();
+            let report = match self.opened.accelerator.step(bodies, collisions, &self.parameters) {
+                Ok(report) => report,
+                Err(error) if board::is_cancelled(&error) => return Ok(None),
+                Err(error) => return Err(self.opened.failure(error)),
+            };
+            self.session.advance();
+            cycles = cycles.saturating_add(report.cycles.total);
+            board += report.modelled_time().as_secs_f64();
+            let now = self.sample(&mut scene, step);
+            deepest = larger(deepest, now.deepest_m);
+            kinetic_most = larger(kinetic_most, now.kinetic_j);
+            let before = std::mem::replace(&mut at_end, now);
+            if (step - 1).is_multiple_of(u32::from(self.rate / SAMPLES)) {
+                samples.push(before);
+            }
+        }
+        let positions = scene.bodies().iter().map(|body| body.pose.position.map(f64::from));
+        let positions: Vec<[f64; 3]> = positions.collect();
+        let pile = Pile {
+            steps: self.steps(),
+            deepest_m: deepest,
+            deepest_at_end_m: at_end.deepest_m,
+            kinetic_at_end_j: at_end.kinetic_j,
+            kinetic_most_j: kinetic_most,
+            distance_from_shortest_m: shortest
+                .map_or(0.0, |other| mean_distance(&positions, other)),
+            cycles_per_second: cycles as f64 / f64::from(self.seconds),
+            board_ms_per_second: board * 1e3 / f64::from(self.seconds),
+            samples: samples.into_iter().chain([at_end]).collect(),
+        };
+        Ok(Some((pile, positions)))
+    }
+
+    /// Detects the collisions of the next step, and measures the pile.
+    fn sample(&self, scene: &mut Scene, step: u32) -> Sample {
+        let deepest_m = scene::penetration(scene.detect()).largest;
+        let StepParameters { gravity, time_step, .. } = self.parameters;
+        let (bodies, shapes) = (scene.bodies(), scene.shapes());
+        let kinetic = match step {
+            0 => scene::kinetic_energy_parts(bodies, shapes),
+            _ => scene::kinetic_energy_before_gravity(bodies, shapes, gravity, time_step),
+        };
+        Sample {
+            seconds: f64::from(step) / f64::from(self.rate),
+            deepest_m,
+            kinetic_j: kinetic.total(),
+            potential_j: scene::potential_energy(bodies, shapes, gravity),
+        }
+    }
+}
+
+/// A body in free flight.
+#[derive(Debug, Clone, Copy)]
+struct Thrown {
+    position: [f64; 3],
+    speed: [f64; 3],
+    gravity: [f64; 3],
+}
+
+/// Which velocity of a step moves the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Euler {
+    /// The one at the start (thesis, equations 2.5 and 2.6).
+    Explicit,
+    /// The one at the end (equations 2.8 to 2.10).
+    Symplectic,
+}
+
+impl Thrown {
+    /// Equation 2.7.
+    fn exact(&self, t: f64) -> [f64; 3] {
+        [0, 1, 2].map(|k| self.position[k] + self.speed[k] * t + 0.5 * self.gravity[k] * t * t)
+    }
+
+    fn euler(mut self, rate: u16, steps: u32, kind: Euler) -> [f64; 3] {
+        let dt = 1.0 / f64::from(rate);
+        for _ in 0..steps {
+            for k in 0..3 {
+                let before = self.speed[k];
+                self.speed[k] += self.gravity[k] * dt;
+                let moves = match kind {
+                    Euler::Explicit => before,
+                    Euler::Symplectic => self.speed[k],
+                };
+                self.position[k] += moves * dt;
+            }
+        }
+        self.position
+    }
+}
+
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    (x * x + y * y + z * z).sqrt()
+}
+
+fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    let sum = a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + distance(*a, *b));
+    // The ground, which all runs share, does not move.
+    sum / (a.len().saturating_sub(1) as f64).max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THROWN: Thrown =
+        Thrown { position: [1.0, 2.0, 0.0], speed: [3.0, 8.0, 0.0], gravity: [0.0, -10.0, 0.0] };
+
+    /// By hand: both are off by g t dt / 2, explicit above and symplectic below.
+    #[test]
+    fn euler_is_off_by_half_a_step_of_the_speed_gained() {
+        assert!(distance(THROWN.exact(2.0), [7.0, -2.0, 0.0]) < 1e-12);
+        for rate in RATES {
+            let steps = 2 * u32::from(rate);
+            let [explicit, symplectic] = [Euler::Explicit, Euler::Symplectic]
+                .map(|kind| THROWN.euler(rate, steps, kind)[1] - THROWN.exact(2.0)[1]);
+            let expected = 10.0 * 2.0 / f64::from(rate) / 2.0;
+            assert!((explicit - expected).abs() < 1e-9, "{explicit}");
+            assert!((symplectic + expected).abs() < 1e-9, "{symplectic}");
+        }
+    }
+
+    #[test]
+    fn the_mean_distance_leaves_the_ground_out() {
+        let at = |y| vec![[0.0; 3], [0.0, y, 0.0], [0.0, y, 0.0]];
+        assert!((mean_distance(&at(1.0), &at(4.0)) - 3.0).abs() < 1e-12);
+    }
+}
