@@ -4,8 +4,6 @@ use std::fmt;
 
 use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 
-use super::{Excess, InputError};
-
 /// The profiles, built with their default formats, that take a refused scene: its refused value and
 /// its number of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,13 +59,6 @@ pub(crate) struct SceneNeeds {
 }
 
 impl SceneNeeds {
-    /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
-    /// excess.
-    #[cold]
-    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
-        InputError::BeyondBitstream { excess, capable: self.capable(can) }
-    }
-
     /// The profiles that have room for the scene and satisfy `can`.
     pub(crate) fn capable(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;

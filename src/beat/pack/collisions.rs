@@ -9,9 +9,10 @@ use pgs_interface::record::{Beat, collision};
 
 use super::encode::{Encoding, most_are_full};
 use super::pool::{ChannelChunks, PackPool, Piece, ranges, whole};
-use super::stripe_writer::{BLOCK, CHECKED, MANY, StripeWriter};
+use super::stripe_writer::{CHECKED, MANY, StripeWriter};
 use super::target::Target;
 use crate::beat::format::{Format, in_format};
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Ends, Lookup as _};
 use crate::record::sixteen::Sixteen;

@@ -12,8 +12,8 @@ use pgs_interface::record::{Beat, LANES, collision};
 
 use super::encode::Encoding;
 use super::pool::{PackPool, Stretch as _, ranges};
-use super::stripe_writer::BLOCK;
 use crate::beat::format::{Beats, Format, Join, Records as _, in_format};
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Ends, Lookup as _};
 use crate::record::sixteen::Sixteen;

@@ -12,16 +12,10 @@ use pgs_interface::record::Beat;
 use super::pattern::Pattern;
 use super::unrolled;
 use crate::beat::format::{Beats, Format, Records, in_format};
-use crate::beat::stripe::{Deal, Layout};
-use crate::beat::unpack::results::total;
+use crate::beat::stripe::{BLOCK, Deal, Layout, total};
 use crate::record::sixteen::Sixteen;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
-
-/// Records of a block. The number is divisible by the records of a group of every stripe, so that
-/// each block begins with a group. A block and the collisions that are prefetched meanwhile fit in
-/// the L1 cache.
-pub(crate) const BLOCK: usize = 30;
 
 /// Records of many blocks: at this number the start of a run costs next to nothing a record.
 pub(crate) const MANY: usize = 32 * BLOCK;

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::PackPool;
-use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::pack::target::Target;
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Survey, Table};
 use crate::scene::{

@@ -10,7 +10,7 @@ use super::stripe_reader::{self, Tally};
 use crate::beat::format::{Format, in_format};
 use crate::beat::pack::pattern::Pattern;
 use crate::beat::pack::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
-use crate::beat::stripe::{Deal, Layout};
+use crate::beat::stripe::{Deal, Layout, total};
 use crate::record::finite::Finite;
 use crate::record::result::Record;
 use crate::record::sixteen::Sixteen;
@@ -140,11 +140,6 @@ pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
 /// Adds a beat word by word, modulo 2^32.
 fn plus(sum: Lanes, beat: &Beat) -> Lanes {
     sum.plus((*beat).into())
-}
-
-/// The sum of the lanes' sums.
-pub(crate) fn total(sum: Lanes) -> u32 {
-    sum.words().into_iter().fold(0, u32::wrapping_add)
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ mod tests {
 
     use super::*;
     use crate::beat::format::in_format;
-    use crate::beat::pack::stripe_writer::BLOCK;
+    use crate::beat::stripe::BLOCK;
     use crate::beat::stripe::{Layout, Segment};
     use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
