@@ -232,9 +232,9 @@ mod tests {
 
     #[test]
     fn world_inertia_doubles_the_velocities_alone() {
-        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
-        assert_eq!(Velocities.layout(&world).beats(5), 10);
-        assert_eq!(Poses.layout(&world).beats(5), 5);
+        let world = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };
+        assert_eq!(Velocities.layout(&world).beats(5), 20);
+        assert_eq!(Poses.layout(&world).beats(5), 10);
     }
 
     #[test]

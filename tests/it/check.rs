@@ -201,7 +201,7 @@ fn boards_of_every_profile_pass_every_line() {
     let short = Numbers { velocities: Precision::Binary16, ..FLOAT.numbers };
     let mut configs = Vec::new();
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
+        for inertia in profile.inertias().iter().copied() {
             configs.push(BoardConfig { profile, inertia, ..BoardConfig::default() });
         }
     }

@@ -26,7 +26,8 @@ fn boards() -> impl Iterator<Item = BoardConfig> {
         inertia,
         ..BoardConfig::default()
     };
-    let both = move |&profile| [Inertia::Isotropic, Inertia::World].map(|i| of(profile, i));
+    let both =
+        move |&profile: &&'static Profile| profile.inertias().iter().map(move |i| of(profile, *i));
     let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF, Inertia::Isotropic) };
     PROFILES.iter().flat_map(both).chain([thesis])
 }

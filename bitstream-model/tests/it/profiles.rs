@@ -23,10 +23,9 @@ fn config(profile: &'static Profile) -> BoardConfig {
 fn variants() -> Vec<Variant> {
     let mut variants = Vec::new();
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
-            let own = profile.numbers;
-            variants.push(Variant { profile, numbers: own, inertia });
-        }
+        let own = profile.numbers;
+        let built = profile.inertias().iter();
+        variants.extend(built.map(|inertia| Variant { profile, numbers: own, inertia: *inertia }));
     }
     for thesis in [StreamFormat::Thesis16, StreamFormat::Thesis16Literal] {
         let numbers =
@@ -398,10 +397,9 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
         refusal(BoardConfig { numbers: Some(numbers), ..config(profile) })
     };
     let thesis = StreamFormat::Thesis16;
-    for format in [thesis, StreamFormat::Thesis16Literal] {
-        let numbers = Some(Numbers { bodies: format, ..HALF.numbers });
-        let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
-        assert!(text.contains(&format!("in {}, which has no zero", format.name())), "{text}");
+    for profile in [&NAIVE, &HALF] {
+        let text = refusal(BoardConfig { inertia: Inertia::World, ..config(profile) });
+        assert!(text.contains(&format!("inertia on {}, found world", profile.name)), "{text}");
     }
     let text = with(&FLOAT, Numbers { bodies: thesis, ..Numbers::F32 });
     assert!(text.contains("velocity records of 16 bits a number, expected 32"), "{text}");

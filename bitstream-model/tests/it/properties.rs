@@ -9,7 +9,7 @@ use pgs_interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LEN
 use pgs_interface::control::{self, ap_ctrl};
 use pgs_interface::descriptor::WORDS;
 use pgs_interface::number::{Numbers, StreamFormat};
-use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile, Variant};
+use pgs_interface::profile::{HALF, PROFILES, Profile, Variant};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -109,20 +109,16 @@ fn act() -> impl Strategy<Value = Act> {
 
 /// Every profile with its default options, with world inertia, and two in the formats of the thesis.
 fn variants() -> Vec<Variant> {
-    let own = |inertia| {
-        move |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() }
+    let own = |profile: &&'static Profile| {
+        let (variant, built) = (profile.default_variant(), profile.inertias().iter());
+        built.map(move |inertia| Variant { inertia: *inertia, ..variant })
     };
     let thesis = [StreamFormat::Thesis16, StreamFormat::Thesis16Literal].map(|format| {
         let numbers =
             Numbers { collisions: format, bodies: format, poses: format, ..Numbers::BINARY16 };
         Variant { numbers, ..HALF.default_variant() }
     });
-    PROFILES
-        .iter()
-        .map(own(Inertia::Isotropic))
-        .chain(PROFILES.iter().map(own(Inertia::World)))
-        .chain(thesis)
-        .collect()
+    PROFILES.iter().flat_map(own).chain(thesis).collect()
 }
 
 fn config() -> impl Strategy<Value = BoardConfig> {

@@ -120,7 +120,7 @@ impl<V: Vectors, F: Join> Rows for Made<'_, V, F> {
 
 #[cfg(test)]
 mod tests {
-    use pgs_interface::profile::{Inertia, PROFILES, Variant};
+    use pgs_interface::profile::{PROFILES, Variant};
 
     use super::*;
     use crate::beat::format::in_format;
@@ -197,8 +197,8 @@ mod tests {
     #[test]
     fn all_records_of_the_profiles_are_written_by_units() {
         for profile in PROFILES {
-            for inertia in [Inertia::Isotropic, Inertia::World] {
-                let variant = Variant { inertia, ..profile.default_variant() };
+            for inertia in profile.inertias() {
+                let variant = Variant { inertia: *inertia, ..profile.default_variant() };
                 for segment in [Segment::Velocities, Segment::Collisions, Segment::Poses] {
                     let layout = segment.layout(&variant);
                     let written = match layout.rows {

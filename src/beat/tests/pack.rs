@@ -135,6 +135,7 @@ const LITERAL_SPEC: Spec = Spec {
 fn any_spec() -> impl Strategy<Value = Spec> {
     let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, LITERAL_SPEC];
     (prop::sample::select(specs), any::<bool>()).prop_map(|(spec, world)| {
+        let world = world && spec.variant.profile.world.is_some();
         let inertia = if world { Inertia::World } else { Inertia::Isotropic };
         Spec { variant: Variant { inertia, ..spec.variant }, world, ..spec }
     })

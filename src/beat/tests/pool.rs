@@ -210,7 +210,8 @@ fn any_count() -> impl Strategy<Value = usize> {
 
 fn any_variant() -> impl Strategy<Value = Variant> {
     (prop::sample::select(PROFILES.to_vec()), any::<bool>()).prop_map(|(profile, world)| {
-        let inertia = if world { Inertia::World } else { Inertia::Isotropic };
+        let inertia =
+            profile.world.filter(|_| world).map_or(Inertia::Isotropic, |_| Inertia::World);
         Variant { inertia, ..profile.default_variant() }
     })
 }

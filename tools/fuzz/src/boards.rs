@@ -1,7 +1,7 @@
 //! Chooses how a board is built.
 
 use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Variant};
+use bitstream_model::interface::profile::{HALF, PROFILES, Variant};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
 
 use crate::input::Input;
@@ -44,19 +44,18 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
 }
 
 fn variant(input: &mut Input<'_>) -> Variant {
-    let choice = input.index(2 * PROFILES.len() + 2);
-    match PROFILES.get(choice / 2) {
-        None => {
-            let literal = choice.is_multiple_of(2);
-            let thesis =
-                if literal { StreamFormat::Thesis16Literal } else { StreamFormat::Thesis16 };
-            let numbers =
-                Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
-            Variant { numbers, ..HALF.default_variant() }
-        }
-        Some(profile) if choice.is_multiple_of(2) => profile.default_variant(),
-        Some(profile) => Variant { inertia: Inertia::World, ..profile.default_variant() },
-    }
+    let thesis = |format| {
+        let numbers =
+            Numbers { collisions: format, bodies: format, poses: format, ..Numbers::BINARY16 };
+        Variant { numbers, ..HALF.default_variant() }
+    };
+    let built = PROFILES.iter().flat_map(|profile| {
+        let inertias = profile.inertias().iter();
+        inertias.map(|inertia| Variant { inertia: *inertia, ..profile.default_variant() })
+    });
+    let all: Vec<Variant> =
+        built.chain([StreamFormat::Thesis16, StreamFormat::Thesis16Literal].map(thesis)).collect();
+    input.pick(&all)
 }
 
 #[cfg(test)]
