@@ -172,7 +172,7 @@ impl StepPacker {
             bodies,
             count,
             into,
-            (&mut velocities[active], Some(&mut poses[active])),
+            (&mut velocities[active], &mut poses[active]),
             &mut self.packers,
         );
         (velocities.wrapping_add(poses), good)

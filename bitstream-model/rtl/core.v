@@ -74,17 +74,15 @@ module core (
   localparam SHAPE          = 6;               // bits of a shape's number
 
   // Passes of the step: a kind that has any has a warm one more. Without collisions there are none.
-  wire      takes_impulses = warm_start & (DESIGN_WARM_START != 0);
-  wire      gives_impulses = impulses_out & (DESIGN_WARM_START != 0);
   reg [8:0] contact_passes, friction_passes;
   reg [9:0] passes;
   reg       no_contacts;
   always @(posedge clk) begin
     no_contacts     <= contact_passes == 9'd0;
     contact_passes  <= (collisions == 20'd0) ? 9'd0
-                     : {1'b0, contact_iterations} + {8'd0, takes_impulses & |contact_iterations};
+                     : {1'b0, contact_iterations} + {8'd0, warm_start & |contact_iterations};
     friction_passes <= (collisions == 20'd0) ? 9'd0
-                     : {1'b0, friction_iterations} + {8'd0, takes_impulses & |friction_iterations};
+                     : {1'b0, friction_iterations} + {8'd0, warm_start & |friction_iterations};
     passes          <= {1'b0, contact_passes} + {1'b0, friction_passes};
   end
 
@@ -103,7 +101,7 @@ module core (
   ) steps (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
-    .warm_start(takes_impulses), .impulses_out(gives_impulses),
+    .warm_start(warm_start), .impulses_out(impulses_out),
     .loads(|loads), .load_finished(load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
@@ -140,7 +138,7 @@ module core (
       receiver #(.CHANNEL(k), .WORLD_INERTIA(DESIGN_WORLD_INERTIA)) stream (
         .clk(clk), .stop(reset | error), .start(start), .clear(clear),
         .bodies(bodies), .collisions(collisions),
-        .passes(passes), .friction_passes(friction_passes), .warm_start(takes_impulses),
+        .passes(passes), .friction_passes(friction_passes), .warm_start(warm_start),
         .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
         .tvalid(s_tvalid[k]), .tready(s_tready[k]),
         .head(head[k]), .count(count[k]), .there(there[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),

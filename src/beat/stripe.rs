@@ -25,7 +25,7 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, collision, pose, result, velocity_result};
+use pgs_interface::record::{LANES, collision, pose, result};
 use pgs_interface::stripe::Stripe;
 
 /// The records that a segment carries.
@@ -41,8 +41,6 @@ pub(crate) enum Segment {
     Poses,
     /// New state of each body.
     Results,
-    /// New velocity of each body, in a step without poses.
-    VelocityResults,
 }
 
 /// Where a beat goes.
@@ -79,7 +77,6 @@ impl Segment {
             },
             Self::Poses => (pose::ROWS, numbers.poses, stripes.poses),
             Self::Results => (result::ROWS, numbers.poses, stripes.results),
-            Self::VelocityResults => (velocity_result::ROWS, numbers.poses, stripes.results),
         };
         Layout { rows, format, stripe }
     }

@@ -192,7 +192,7 @@ impl Device {
         if let Some(error) = self.control.sticky_error() {
             return Err(Symptom::Sticky(error));
         }
-        let counters = self.control.counters(&self.capabilities);
+        let counters = self.control.counters();
         match counters.cycles {
             // All ones: no step takes two thousand years.
             u64::MAX => return Err(gone()),

@@ -285,15 +285,13 @@ impl Device {
             return Err(control_block_reset().into());
         }
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        let extensions = self.capabilities.extensions;
         let arguments = StepArguments {
             bodies: count(plan.bodies),
             collisions: count(plan.collisions),
             parameters,
             streamed_masses: plan.streamed_masses,
-            velocities_only: plan.velocities_only,
         };
-        self.control.set_arguments(&arguments, extensions);
+        self.control.set_arguments(&arguments);
         // Buffers and descriptors must be visible before the first doorbell.
         release_to_device();
         Ok(())

@@ -57,14 +57,7 @@ mod tests {
     fn outline(variant: pgs_interface::profile::Variant, collisions: usize) -> Outline {
         let passes = Passes { contact: 3, friction: 2, ..Passes::default() };
         // One beat a descriptor.
-        let plan = Plan {
-            bodies: 8,
-            collisions,
-            passes,
-            variant,
-            streamed_masses: false,
-            velocities_only: false,
-        };
+        let plan = Plan { bodies: 8, collisions, passes, variant, streamed_masses: false };
         Outline::new(&plan, 16)
     }
 

@@ -41,8 +41,6 @@ pub(crate) struct Plan {
     pub(crate) variant: Variant,
     /// Whether the velocity records bring the inverse masses, because the shapes do not fit the table.
     pub(crate) streamed_masses: bool,
-    /// Whether no poses go to the board, and velocities come back alone.
-    pub(crate) velocities_only: bool,
 }
 
 /// Where the segments lie in the buffer of one MM2S channel, beats.
@@ -94,8 +92,7 @@ impl Plan {
             start..start + segment.layout(&self.variant).beats_on_channel(records, channel)
         };
         let velocities = place(Segment::Velocities, self.bodies, 0);
-        let poses = if self.velocities_only { 0 } else { self.bodies };
-        let poses = place(Segment::Poses, poses, velocities.end);
+        let poses = place(Segment::Poses, self.bodies, velocities.end);
         let collisions = place(Segment::Collisions, self.collisions, poses.end);
         let mut end = collisions.end;
         let mut warm = |passes: u32| {
@@ -122,9 +119,7 @@ impl Plan {
 
     /// The layout of the results.
     pub(crate) const fn result_layout(&self) -> Layout {
-        let segment =
-            if self.velocities_only { Segment::VelocityResults } else { Segment::Results };
-        segment.layout(&self.variant)
+        Segment::Results.layout(&self.variant)
     }
 
     /// Beats of results on one S2MM channel, with the impulses in front of them.
@@ -209,7 +204,6 @@ mod tests {
         passes: PASSES,
         variant: FLOAT.default_variant(),
         streamed_masses: false,
-        velocities_only: false,
     };
     const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
@@ -258,18 +252,6 @@ mod tests {
         let contact_alone = Passes { friction: 0, ..passes };
         let plan = Plan { passes: contact_alone, ..FOUR };
         assert_eq!((plan.impulses(0), plan.segments(3).warm_friction), (collisions, None));
-    }
-
-    /// `float` sends no poses and receives half the beats; `half` receives whole groups of five.
-    #[test]
-    fn a_step_without_poses_brings_velocities_back() {
-        let plan = Plan { velocities_only: true, ..FOUR };
-        assert_eq!(plan.bytes_to_device(), 16 * (2 * 38_881 + 8 * 7 * 127_746));
-        assert_eq!(plan.bytes_from_device(), 16 * 2 * 38_881);
-        assert!((0..4).all(|channel| plan.segments(channel).poses.is_empty()));
-        assert!((0..4).all(|channel| plan.descriptors(channel, 67_108_800) == 9));
-        let half = Plan { variant: HALF.default_variant(), ..plan };
-        assert_eq!(half.bytes_from_device(), 16 * 38_885);
     }
 
     #[test]

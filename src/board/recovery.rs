@@ -7,7 +7,6 @@ use super::plan::Plan;
 use super::root_cause::other_bitstream;
 use super::symptom::Symptom;
 use crate::axi_dma::DmaError;
-use crate::control_block::Capabilities;
 use crate::error::{Aftermath, Error};
 use crate::fault::Fault;
 use crate::scene::Shape;
@@ -134,8 +133,7 @@ impl Device {
     /// Writes shapes that were checked to the table, unless their masses are streamed.
     pub(crate) fn load_shapes(&mut self, shapes: &[Shape]) {
         if !self.capabilities.streams_masses(shapes.len()) {
-            let Capabilities { variant, extensions, .. } = &self.capabilities;
-            self.control.load_shapes(shapes, variant.inertia, *extensions);
+            self.control.load_shapes(shapes, self.capabilities.variant.inertia);
         }
     }
 

@@ -131,7 +131,7 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
             described(&capabilities.variant),
             capabilities.clock_khz,
             capabilities.body_capacity,
-            match capabilities.extensions.streamed_masses {
+            match capabilities.variant.has_streamed_masses() {
                 true => "any number of".to_owned(),
                 false => capabilities.shape_capacity.to_string(),
             },
@@ -349,7 +349,7 @@ mod tests {
         let mut lines = Lines::default();
         assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
         let lines = lines.finish();
-        assert_eq!(lines[1].outcome, Outcome::ok("1.2"));
+        assert_eq!(lines[1].outcome, Outcome::ok("2.0"));
         assert!(
             matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
         );

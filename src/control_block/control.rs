@@ -7,7 +7,6 @@ use pgs_interface::control::{
     FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, IER, POSITION_COEFFICIENT,
     POSITION_DRIFT, RESET, SPIN_DAMPING, TIME_STEP, ap_ctrl, flags, irq, reset,
 };
-use pgs_interface::extension::Extensions;
 use pgs_interface::register::Register;
 
 use super::ControlError;
@@ -17,7 +16,7 @@ use crate::scene::StepParameters;
 /// How long the accelerator may take to reset.
 const RESET_LIMIT: Duration = Duration::from_millis(10);
 
-/// Number of arguments, extensions included.
+/// Number of arguments.
 const ARGUMENTS: usize = 14;
 
 /// The arguments of a step.
@@ -31,8 +30,6 @@ pub(crate) struct StepArguments<'a> {
     pub(crate) parameters: &'a StepParameters,
     /// Whether the bodies bring their masses; else the shape table has them.
     pub(crate) streamed_masses: bool,
-    /// Whether velocities come back alone; else poses go to the board, and come back with them.
-    pub(crate) velocities_only: bool,
 }
 
 /// The argument registers of a step and their values.
@@ -58,15 +55,13 @@ fn registers_of(arguments: &StepArguments<'_>) -> [(Register, u32); ARGUMENTS] {
 
 /// The switches of a step.
 fn flags_of(arguments: &StepArguments<'_>) -> u32 {
-    let StepArguments { parameters, streamed_masses, velocities_only, .. } = *arguments;
+    let StepArguments { parameters, streamed_masses, .. } = *arguments;
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
-    let word = flags::SHAPE_FRICTION.put(word, parameters.shape_friction.into());
     let word = flags::WARM_START.put(word, parameters.warm_start.into());
     let word = flags::IMPULSES_OUT.put(word, parameters.impulses_out.into());
-    let word = flags::STREAMED_MASSES.put(word, streamed_masses.into());
-    flags::VELOCITIES_ONLY.put(word, velocities_only.into())
+    flags::STREAMED_MASSES.put(word, streamed_masses.into())
 }
 
 /// The accelerator's control block.
@@ -104,12 +99,10 @@ impl Control {
         self.window.write32(offset, value);
     }
 
-    /// Writes the arguments that differ from the values in the registers. A board without an
-    /// extension has no register for its argument.
-    pub(crate) fn set_arguments(&mut self, arguments: &StepArguments<'_>, extensions: Extensions) {
+    /// Writes the arguments that differ from the values in the registers.
+    pub(crate) fn set_arguments(&mut self, arguments: &StepArguments<'_>) {
         for (place, (register, value)) in registers_of(arguments).into_iter().enumerate() {
-            let exists = register.offset != SPIN_DAMPING.offset || extensions.spin_damping;
-            if exists && self.written[place] != Some(value) {
+            if self.written[place] != Some(value) {
                 self.write(register.offset, value);
                 self.written[place] = Some(value);
             }
@@ -155,13 +148,7 @@ mod tests {
 
     /// Two bodies and a collision.
     fn step(parameters: &StepParameters) -> StepArguments<'_> {
-        StepArguments {
-            bodies: 2,
-            collisions: 1,
-            parameters,
-            streamed_masses: false,
-            velocities_only: false,
-        }
+        StepArguments { bodies: 2, collisions: 1, parameters, streamed_masses: false }
     }
 
     #[test]
@@ -169,12 +156,12 @@ mod tests {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let parameters = StepParameters::default();
-        control.set_arguments(&step(&parameters), Extensions::ALL);
+        control.set_arguments(&step(&parameters));
         assert_eq!(registers.with(|state| state.writes.len()), ARGUMENTS);
         assert_eq!(registers.with(|state| state.values[&0x38]), (1.0f32 / 60.0).to_bits());
         assert_eq!(registers.with(|state| state.values[&0x30]), 1);
         let more = StepArguments { collisions: 7, ..step(&parameters) };
-        control.set_arguments(&more, Extensions::ALL);
+        control.set_arguments(&more);
         assert_eq!(registers.with(|state| state.writes[ARGUMENTS..].to_vec()), [(0x18, 7)]);
     }
 
@@ -186,20 +173,8 @@ mod tests {
         assert_eq!(word(StepParameters::default()), 0b001);
         assert_eq!(word(none.with_kinematic(true)), 0b010);
         assert_eq!(word(none.with_pair_friction(true)), 0b100);
-        assert_eq!(word(none.with_shape_friction(true)), 0b1000_0000);
         let masses = StepArguments { streamed_masses: true, ..step(&none) };
         assert_eq!(flags_of(&masses), 0b010_0000);
-        let velocities = StepArguments { velocities_only: true, ..step(&none) };
-        assert_eq!(flags_of(&velocities), 0b100_0000);
-    }
-
-    #[test]
-    fn a_board_of_version_1_1_gets_no_argument_that_it_lacks() {
-        let registers = FakeRegisters::default();
-        let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(&step(&StepParameters::default()), Extensions::NONE);
-        assert_eq!(registers.with(|state| state.writes.len()), 13);
-        assert!(registers.with(|state| state.writes.iter().all(|(offset, _)| *offset <= 0x70)));
     }
 
     #[test]
@@ -207,13 +182,13 @@ mod tests {
         let registers = FakeRegisters::default();
         registers.with(|state| state.kept_bits.insert(0x1C0, 0));
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.set_arguments(&step(&StepParameters::default()), Extensions::ALL);
+        control.set_arguments(&step(&StepParameters::default()));
         control.reset(&FakePlatform::default()).expect("out of reset");
         assert_eq!(
             registers.with(|state| state.writes[ARGUMENTS..].to_vec()),
             [(0x1C0, 1), (0x04, 1), (0x08, 4)]
         );
-        control.set_arguments(&step(&StepParameters::default()), Extensions::ALL);
+        control.set_arguments(&step(&StepParameters::default()));
         assert_eq!(registers.with(|state| state.writes.len()), 2 * ARGUMENTS + 3);
     }
 

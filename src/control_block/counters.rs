@@ -8,7 +8,7 @@ use pgs_interface::control::{
     WORK_CYCLES,
 };
 
-use super::{Capabilities, Control};
+use super::Control;
 
 /// The accelerator's sticky error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,10 +30,9 @@ pub(crate) struct Counters {
     pub(crate) waits: u32,
     /// Collisions that met a hazard.
     pub(crate) hazards: u32,
-    /// Sums of the words received and sent, if the bitstream has them.
-    pub(crate) sums: Option<(u32, u32)>,
-    /// Sum of the accumulated normal impulses, N s, if the bitstream has it and it is below its
-    /// maximum.
+    /// Sums of the words received and sent.
+    pub(crate) sums: (u32, u32),
+    /// Sum of the accumulated normal impulses, N s, if it is below its maximum.
     pub(crate) impulse_sum: Option<f64>,
     /// The counters that stand at their maximum.
     pub(crate) saturated: Saturated,
@@ -70,16 +69,14 @@ impl Control {
     }
 
     /// Reads the counters of the step that has ended.
-    pub(crate) fn counters(&self, capabilities: &Capabilities) -> Counters {
+    pub(crate) fn counters(&self) -> Counters {
         let wide = |high: u32, low: u32| (u64::from(high) << 32) | u64::from(low);
         let hazards = self.read(&HAZARDS);
         let work = self.read(&WORK_CYCLES);
         let waits = self.read(&WAIT_CYCLES);
-        let sums = capabilities.checksums.then(|| (self.read(&SUM_RECEIVED), self.read(&SUM_SENT)));
-        let impulses = capabilities.impulse_sum.then(|| {
-            let low = self.read(&IMPULSE_SUM_LO);
-            wide(self.read(&IMPULSE_SUM_HI), low)
-        });
+        let sums = (self.read(&SUM_RECEIVED), self.read(&SUM_SENT));
+        let low = self.read(&IMPULSE_SUM_LO);
+        let impulses = wide(self.read(&IMPULSE_SUM_HI), low);
         // Last: no step takes 0 cycles, so that 0 here tells of a reset at any of these reads.
         let high = self.read(&CYCLES_HI);
         let cycles = wide(high, self.read(&CYCLES_LO));
@@ -87,9 +84,9 @@ impl Control {
             work: work == COUNTER_MAX,
             waits: waits == COUNTER_MAX,
             hazards: hazards == COUNTER_MAX,
-            impulse_sum: impulses == Some(IMPULSE_SUM_MAX),
+            impulse_sum: impulses == IMPULSE_SUM_MAX,
         };
-        let impulse_sum = impulses.filter(|_| !saturated.impulse_sum).map(impulse);
+        let impulse_sum = (!saturated.impulse_sum).then(|| impulse(impulses));
         Counters { cycles, work, waits, hazards, sums, impulse_sum, saturated }
     }
 }
@@ -110,7 +107,6 @@ pub(crate) fn time_of(cycles: u64, clock_khz: u32) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control_block::{fake, identify};
     use crate::platform::RegisterMap;
     use crate::platform::fake::FakeRegisters;
 
@@ -137,15 +133,13 @@ mod tests {
     #[test]
     fn a_counter_at_its_maximum_is_no_number() {
         let registers = FakeRegisters::default();
-        fake::describe(&registers);
-        let capabilities = identify(&registers.window(RegisterMap::Control)).expect("well formed");
         let control = Control::new(registers.window(RegisterMap::Control));
         let counted = |low: u32, others: u32| {
             registers.with(|state| {
                 state.values.extend([(0x1A4, low), (0x1A8, u32::MAX)]);
                 state.values.extend([(0x190, others), (0x194, others), (0x198, others)]);
             });
-            control.counters(&capabilities)
+            control.counters()
         };
         let most = counted(u32::MAX - 1, u32::MAX - 1);
         assert_eq!(most.saturated, Saturated::default());

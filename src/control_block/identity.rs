@@ -9,7 +9,6 @@ use pgs_interface::control::{
     SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, channels, depth, dma, features, issue,
     memory_per_record, numbers, version,
 };
-use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Inertia, Profile, Variant};
@@ -26,16 +25,10 @@ pub struct Capabilities {
     pub variant: Variant,
     /// Interface version, major and minor.
     pub version: (u32, u32),
-    /// Its abilities beyond interface version 1.1.
-    pub extensions: Extensions,
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
     pub interlocked: bool,
-    /// Whether words received and sent are summed, which detects a corrupted beat.
-    pub checksums: bool,
     /// Whether subnormal numbers count as zero.
     pub flush_subnormals: bool,
-    /// Whether accumulated normal impulses are summed.
-    pub impulse_sum: bool,
     /// Streams into the accelerator.
     pub mm2s_channels: usize,
     /// Streams out of the accelerator.
@@ -79,18 +72,13 @@ impl Capabilities {
 
     /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
     pub(crate) const fn streams_masses(&self, shapes: usize) -> bool {
-        self.extensions.streamed_masses && shapes > self.shape_capacity as usize
-    }
-
-    /// Whether a step that integrates nothing does without poses.
-    pub(crate) const fn without_poses(&self, integrate: bool) -> bool {
-        self.extensions.velocities_only && !integrate
+        self.variant.has_streamed_masses() && shapes > self.shape_capacity as usize
     }
 
     /// The largest number of shapes. Where each body can bring its inverse mass, the table does not limit it.
     #[must_use]
     pub const fn shapes_max(&self) -> u32 {
-        if self.extensions.streamed_masses { u32::MAX } else { self.shape_capacity }
+        if self.variant.has_streamed_masses() { u32::MAX } else { self.shape_capacity }
     }
 }
 
@@ -209,12 +197,8 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     Ok(Capabilities {
         variant,
         version: (major, minor),
-        // A bit that the design cannot have means nothing.
-        extensions: Extensions::reported(able).and(Extensions::possible(&variant)),
         interlocked: features::INTERLOCKED.is_set(able),
-        checksums: features::CHECKSUMS.is_set(able),
         flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
-        impulse_sum: features::IMPULSE_SUM.is_set(able),
         mm2s_channels: channels::MM2S.of(streams) as usize,
         s2mm_channels: channels::S2MM.of(streams) as usize,
         initiation_interval: issue::INTERVAL.of(interval),
@@ -234,7 +218,7 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     })
 }
 
-/// Reads the fence. A bitstream of a version before 1.3 reads 0 in both registers.
+/// Reads the fence. A bitstream without one reads 0 in both registers.
 fn fence_of(window: &Window) -> Result<Option<Fence>, IdentityError> {
     let base = window.read32(FENCE_BASE.offset);
     let segment = |size| Fence::from_registers([base, size]);
@@ -312,9 +296,9 @@ pub(crate) mod fake {
         registers.with(|state| {
             state.values.extend([
                 (0x100, 0x5047_5331),
-                (0x104, 0x0001_0002),
+                (0x104, 0x0002_0000),
                 (0x108, 1),
-                (0x10C, 0xB),
+                (0x10C, 0x1),
                 (0x110, 0x0404),
                 (0x114, 0x4444),
                 (0x118, 0x4444),
@@ -353,9 +337,8 @@ mod tests {
     #[test]
     fn a_known_bitstream_is_described() {
         let found = identify_with(&[]).expect("well formed");
-        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 2)));
-        assert!(found.checksums && found.interlocked && found.impulse_sum);
-        assert!(!found.flush_subnormals);
+        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (2, 0)));
+        assert!(found.interlocked && !found.flush_subnormals);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
         assert_eq!(found.contact, Depth { fill: 374, window: 324 });
         assert_eq!((found.bytes_per_body, found.bytes_per_collision), (24, 16));
@@ -381,10 +364,10 @@ mod tests {
         ));
         assert!(matches!(identify_with(&[(0x100, u32::MAX)]), Err(IdentityError::Gone)));
         assert!(matches!(
-            identify_with(&[(0x104, 0x0002_0001)]),
-            Err(IdentityError::Version { major: 2, minor: 1 })
+            identify_with(&[(0x104, 0x0001_0003)]),
+            Err(IdentityError::Version { major: 1, minor: 3 })
         ));
-        assert!(identify_with(&[(0x104, 0x0001_0007)]).is_ok(), "minor versions are compatible");
+        assert!(identify_with(&[(0x104, 0x0002_0007)]).is_ok(), "minor versions are compatible");
     }
 
     #[test]
@@ -464,9 +447,9 @@ mod tests {
             impulses: Precision::Binary16,
         };
         assert_eq!(found.variant.numbers, expected);
-        let found = with(&[], &[(0x10C, 0x1B)]).expect("with world inertia");
+        let found = with(&[], &[(0x10C, 0x3)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
-        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x1B)]);
+        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x3)]);
         let error = error.expect_err("no zero").to_string();
         assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
         let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");
@@ -484,12 +467,5 @@ mod tests {
             let error = identify_with(&registers).expect_err(named).to_string();
             assert!(error.contains(named), "{error}");
         }
-    }
-
-    /// A bitstream of version 1.0 has no such register: it reads 0, as in f32 throughout.
-    #[test]
-    fn a_bitstream_of_version_1_0_is_f32_throughout() {
-        let found = identify_with(&[(0x104, 0x0001_0000), (0x144, 0)]).expect("well formed");
-        assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (1, 0)));
     }
 }

@@ -1,9 +1,8 @@
 //! Writes the shape table.
 
 use pgs_interface::control::{
-    SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
+    SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
 };
-use pgs_interface::extension::Extensions;
 use pgs_interface::profile::Inertia;
 
 use super::Control;
@@ -11,14 +10,8 @@ use crate::scene::Shape;
 
 impl Control {
     /// Writes shapes that were checked: the table has room for them, and they are isotropic, unless
-    /// the inertia is streamed with the velocities and the table holds masses only. A bitstream without the
-    /// extension has no frictions.
-    pub(crate) fn load_shapes(
-        &mut self,
-        shapes: &[Shape],
-        inertia: Inertia,
-        extensions: Extensions,
-    ) {
+    /// the inertia is streamed with the velocities and the table holds masses only.
+    pub(crate) fn load_shapes(&mut self, shapes: &[Shape], inertia: Inertia) {
         for (entry, shape) in (SHAPE_TABLE..).step_by(SHAPE_STRIDE as usize).zip(shapes) {
             for offset in (0..SHAPE_STRIDE).step_by(4) {
                 let value = match offset {
@@ -26,7 +19,6 @@ impl Control {
                     SHAPE_INVERSE_INERTIA if inertia == Inertia::Isotropic => {
                         shape.inverse_inertia[0].to_bits()
                     }
-                    SHAPE_FRICTION if extensions.shape_friction => shape.friction.to_bits(),
                     _ => 0,
                 };
                 self.write(entry + offset, value);
@@ -45,11 +37,8 @@ mod tests {
     fn an_entry_is_mass_inertia_and_two_zeros() {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
-        control.load_shapes(
-            &[Shape::STATIC, Shape::isotropic(1.0, 1.5)],
-            Inertia::Isotropic,
-            Extensions::NONE,
-        );
+        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
+        control.load_shapes(&shapes, Inertia::Isotropic);
         let second: Vec<_> = registers.with(|state| state.writes[4..].to_vec());
         assert_eq!(second, [(0x410, 0x3F80_0000), (0x414, 0x3FC0_0000), (0x418, 0), (0x41C, 0)]);
     }
@@ -58,17 +47,8 @@ mod tests {
         let registers = FakeRegisters::default();
         let mut control = Control::new(registers.window(RegisterMap::Control));
         let shape = Shape { inverse_inertia: [1.0, 2.0, 3.0], ..Shape::isotropic(1.0, 0.0) };
-        control.load_shapes(&[shape], Inertia::World, Extensions::NONE);
+        control.load_shapes(&[shape], Inertia::World);
         let entry: Vec<_> = registers.with(|state| state.writes.clone());
         assert_eq!(entry, [(0x400, 0x3F80_0000), (0x404, 0), (0x408, 0), (0x40C, 0)]);
-    }
-
-    #[test]
-    fn a_friction_follows_the_inertia_where_the_table_has_it() {
-        let registers = FakeRegisters::default();
-        let mut control = Control::new(registers.window(RegisterMap::Control));
-        let shape = Shape::isotropic(1.0, 1.5).with_friction(0.5);
-        control.load_shapes(&[shape], Inertia::Isotropic, Extensions::ALL);
-        assert_eq!(registers.with(|state| state.values[&0x408]), 0x3F00_0000);
     }
 }

@@ -102,22 +102,17 @@ pub struct StepParameters {
     pub position_drift: f32,
     /// Share of the penetration that a step removes (Bullet: position coefficient).
     pub position_coefficient: f32,
-    /// Friction coefficient of every contact, unless collisions or shapes have their own.
+    /// Friction coefficient of every contact, unless collisions have their own.
     pub friction: f32,
     /// Whether each collision has a friction of its own
     /// ([`Collision::with_friction`](crate::Collision::with_friction)). A collision without one then
     /// has a friction of 0.
     pub pair_friction: bool,
-    /// Whether the friction of a collision is the product of its shapes' frictions
-    /// ([`Shape::friction`](crate::Shape::friction)), in a bitstream whose collisions have no room for a
-    /// friction.
-    pub shape_friction: bool,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
     /// Share of the spin about the normal that every friction pass takes from both bodies of a
     /// collision, from 0 to 1, where one of them is static or lies on the other. 0 is off; 0.1 is
-    /// Bullet's, and the only value of a bitstream without the
-    /// [extension](pgs_interface::extension::Extensions::spin_damping).
+    /// Bullet's.
     pub spin_damping: f32,
     /// Gravity, m/s², world frame; only a step with integration uses it.
     pub gravity: [f32; 3],
@@ -188,7 +183,6 @@ impl Default for StepParameters {
             position_coefficient: 0.2,
             friction: 0.7,
             pair_friction: false,
-            shape_friction: false,
             angular_damping: 0.99,
             spin_damping: solver::SPIN_DAMPING,
             gravity: [0.0, -9.8, 0.0],
@@ -244,12 +238,6 @@ impl StepParameters {
     #[must_use]
     pub const fn with_pair_friction(self, pair_friction: bool) -> Self {
         Self { pair_friction, ..self }
-    }
-
-    /// The parameters with [`shape_friction`](Self::shape_friction).
-    #[must_use]
-    pub const fn with_shape_friction(self, shape_friction: bool) -> Self {
-        Self { shape_friction, ..self }
     }
 
     /// Sets the share of the angular velocity that a step leaves ([`Self::angular_damping`]), from
@@ -346,7 +334,6 @@ mod tests {
             .with_position_coefficient(0.125)
             .with_friction(0.75)
             .with_pair_friction(true)
-            .with_shape_friction(true)
             .with_spin_damping(0.0)
             .with_kinematic(true)
             .with_warm_start(true)
@@ -366,7 +353,6 @@ mod tests {
             position_coefficient: 0.125,
             friction: 0.75,
             pair_friction: true,
-            shape_friction: true,
             angular_damping: 0.5,
             spin_damping: 0.0,
             kinematic: true,

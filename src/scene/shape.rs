@@ -38,22 +38,16 @@ pub struct Shape {
     /// Diagonal of the inverse inertia about the body's axes, 1/(kg m²). Unless the three are equal
     /// the shape needs a bitstream with world inertia.
     pub inverse_inertia: [f32; 3],
-    /// Friction of the shape, 0 to [`FRICTION_MAX`](Self::FRICTION_MAX). It counts in steps with
-    /// [`StepParameters::shape_friction`](crate::StepParameters::shape_friction) alone.
-    pub friction: f32,
 }
 
 impl Shape {
-    /// The largest friction of a shape: the product of two of them stays within binary16.
-    pub const FRICTION_MAX: f32 = 255.0;
     /// A shape that never moves.
     pub const STATIC: Self = Self::isotropic(0.0, 0.0);
 
-    /// A shape whose inertia is the same about every axis (cube, sphere). Its friction is 1, as every
-    /// constructor sets it.
+    /// A shape whose inertia is the same about every axis (cube, sphere).
     #[must_use]
     pub const fn isotropic(inverse_mass: f32, inverse_inertia: f32) -> Self {
-        Self { inverse_mass, inverse_inertia: [inverse_inertia; 3], friction: 1.0 }
+        Self { inverse_mass, inverse_inertia: [inverse_inertia; 3] }
     }
 
     /// A solid box of uniform density: I.x = m (h.y² + h.z²) / 3, and likewise for y and z.
@@ -174,13 +168,6 @@ impl Shape {
             return Err(ShapeError { parameter, found });
         }
         Ok(Self { inverse_inertia, ..Self::isotropic(inverse_mass, 0.0) })
-    }
-
-    /// The shape with a friction. The friction of a collision is the product of both shapes' frictions: roots
-    /// of two materials' coefficients give their geometric mean.
-    #[must_use]
-    pub const fn with_friction(self, friction: f32) -> Self {
-        Self { friction, ..self }
     }
 
     /// Whether the inertia is the same about every axis.

@@ -47,8 +47,8 @@ pub(crate) struct EchoResult {
     pub(crate) results: Vec<Vec<Beat>>,
     /// Sum of the words that the driver sent.
     pub(crate) sent: u32,
-    /// The accelerator's sums of the words that it received and sent, if it keeps sums.
-    pub(crate) sums: Option<(u32, u32)>,
+    /// The accelerator's sums of the words that it received and sent.
+    pub(crate) sums: (u32, u32),
     /// Interrupts that woke the driver.
     pub(crate) interrupts: u64,
     /// Descriptors used.
@@ -147,9 +147,8 @@ impl Accelerator {
 /// The plan of an echo: bodies alone.
 fn plan(bodies: usize, variant: Variant) -> Plan {
     let (collisions, passes) = (0, Passes::default());
-    // The shapes of an echo fit every table, and it needs the poses.
-    let (streamed_masses, velocities_only) = (false, false);
-    Plan { bodies, collisions, passes, variant, streamed_masses, velocities_only }
+    // The shapes of an echo fit every table.
+    Plan { bodies, collisions, passes, variant, streamed_masses: false }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

@@ -117,8 +117,7 @@ impl<'a> InFlight<'a> {
         let device = &mut accelerator.device;
         let (Some(Started { deadline, doorbells }), Some(sent)) = (flight.started, sent) else {
             // Nothing was streamed.
-            let counts = device.capabilities.impulse_sum;
-            let counters = Counters { impulse_sum: counts.then_some(0.0), ..Counters::default() };
+            let counters = Counters { impulse_sum: Some(0.0), ..Counters::default() };
             return Ok(Ended { counters, report: self.report(&counters) });
         };
         let interrupts = device.wait(&plan, &deadline)?;
@@ -146,8 +145,7 @@ impl<'a> InFlight<'a> {
             |entry| schedule.map_or(Some(entry), |schedule: &Schedule| schedule.get(entry));
         let of_impulses = impulses_of(&device.s2mm, plan, *bank);
         let (impulse_sum, broken) = impulses.read(plan, of_impulses, *given, collision_of);
-        // A step that was not started has no sums.
-        let sent_sum = ended.counters.sums.map(|(_, sent_sum)| sent_sum);
+        let (_, sent_sum) = ended.counters.sums;
         read(device, staged, (plan, *bank), bodies, (sent_sum, impulse_sum))?;
         if let Some(collision) = broken {
             return Err(Fault::ImpulseNotFinite { collision });

@@ -94,7 +94,6 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
             passes: self.parameters.passes(),
             variant: self.limits.variant,
             streamed_masses: device.capabilities.streams_masses(self.shapes.len()),
-            velocities_only: device.capabilities.without_poses(self.parameters.integrate),
         }
     }
 

@@ -58,7 +58,7 @@ impl Device {
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let velocities = &mut velocities[active];
-        let poses = (!plan.velocities_only).then_some(&mut poses[active]);
+        let poses = &mut poses[active];
         let target =
             Target { variant: &plan.variant, shapes, streamed_masses: plan.streamed_masses, quick };
         let packers = &mut self.packers;
@@ -105,7 +105,7 @@ impl Device {
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let velocities = &mut velocities[active];
-        let poses = (!plan.velocities_only).then_some(&mut poses[active]);
+        let poses = &mut poses[active];
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);

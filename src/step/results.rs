@@ -21,14 +21,13 @@ use crate::record::finite::finite;
 use crate::record::result::{self, Record};
 use crate::scene::Bodies;
 
-/// Compares the accelerator's sum of the words that it received with the driver's, if the
-/// accelerator keeps sums.
+/// Compares the accelerator's sum of the words that it received with the driver's.
 pub(super) fn check_received(
     plan: &Plan,
     sent: SentSums,
     counters: &Counters,
 ) -> Result<(), Fault> {
-    let Some((received, _)) = counters.sums else { return Ok(()) };
+    let (received, _) = counters.sums;
     #[allow(clippy::cast_possible_truncation, reason = "the sum is one modulo 2^32")]
     let rounds = plan.passes.total() as u32;
     let SentSums { velocities, collisions, warm, poses } = sent;
@@ -42,13 +41,13 @@ pub(super) fn check_received(
 }
 
 /// Reads the results of a bank into `staged`. Compares the driver's sum of the words, with `before` for
-/// the impulses, with `sent_sum`, the accelerator's sum of the words that it sent.
+/// the impulses, with `expected`, the accelerator's sum of the words that it sent.
 pub(super) fn read<B: Bodies + ?Sized>(
     device: &mut Device,
     staged: &mut Vec<Record>,
     (plan, bank): (&Plan, Bank),
     bodies: &B,
-    (sent_sum, before): (Option<u32>, u32),
+    (expected, before): (u32, u32),
 ) -> Result<(), Fault> {
     // A panic in the caller's code loses the memory: the next step allocates it anew.
     let mut records = std::mem::take(staged);
@@ -60,13 +59,10 @@ pub(super) fn read<B: Bodies + ?Sized>(
         results.read_in_order(plan.bodies, bodies, &statics[bank], &mut records, packers);
     *staged = records;
     let found = found.wrapping_add(before);
-    match (sent_sum, broken) {
-        (Some(expected), _) if expected != found => {
-            Err(Fault::Checksum { direction: Direction::S2mm, expected, found })
-        }
-        (_, Some(body)) => Err(Fault::NotFinite { body }),
-        _ => Ok(()),
+    if expected != found {
+        return Err(Fault::Checksum { direction: Direction::S2mm, expected, found });
     }
+    broken.map_or(Ok(()), |body| Err(Fault::NotFinite { body }))
 }
 
 /// The result beats of each channel in a bank.

@@ -113,14 +113,8 @@ impl Accelerator {
         let variant = limits.variant;
         let passes = parameters.passes();
         let streamed_masses = device.capabilities.streams_masses(shapes.len());
-        let mut plan = Plan {
-            bodies: bodies.len(),
-            collisions: announced,
-            passes,
-            variant,
-            streamed_masses,
-            velocities_only: device.capabilities.without_poses(parameters.integrate),
-        };
+        let mut plan =
+            Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 

@@ -314,26 +314,14 @@ pub enum InputError {
     /// More shapes than the table has entries.
     #[error(
         "found {found} shapes, the bitstream's table takes at most {limit}: give bodies of equal \
-         mass and inertia one shape, or load a bitstream of world inertia with streamed masses \
-         (interface 1.2), which takes any number"
+         mass and inertia one shape, or load a bitstream of world inertia, which takes any number \
+         of them"
     )]
     TooManyShapes {
         /// Shapes given.
         found: usize,
         /// Entries of the table.
         limit: u32,
-    },
-
-    /// The friction of a shape is negative, no number, or so large that a product of two leaves binary16.
-    #[error(
-        "shape {shape}: its friction is {found}, expected 0 to {most}: correct it",
-        most = crate::Shape::FRICTION_MAX
-    )]
-    ShapeFriction {
-        /// The shape.
-        shape: usize,
-        /// Its friction.
-        found: f32,
     },
 
     /// An inverse mass or inertia is negative, subnormal or not finite.

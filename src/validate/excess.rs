@@ -8,28 +8,14 @@ use pgs_interface::number::StreamFormat;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Excess {
-    /// Another value of a parameter that is fixed without an extension of the interface.
+    /// The records of the bitstream do not hold what the step asks for.
     #[error(
-        "the {parameter} is {found}, and this bitstream knows {known} only: give {known}, or load one \
-         with this extension of interface 1.2"
+        "the step asks for {asked}, which the records of this bitstream do not hold: do without, or \
+         load another"
     )]
-    FixedParameter {
-        /// The parameter.
-        parameter: &'static str,
-        /// Its value.
-        found: f32,
-        /// The value without the extension.
-        known: f32,
-    },
-
-    /// The step asks for an extension of the interface.
-    #[error(
-        "the step asks for {extension}, which this bitstream does not have: do without, or load one \
-         with this extension of interface 1.2"
-    )]
-    MissingExtension {
-        /// The extension.
-        extension: &'static str,
+    NotInRecords {
+        /// What was asked for.
+        asked: &'static str,
     },
 
     /// More bodies than the bitstream has room for, whatever the memory.

@@ -35,7 +35,6 @@ use self::rows::Rows;
 use self::shape::check_shapes;
 use crate::control_block::Capabilities;
 use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
-use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
@@ -44,8 +43,6 @@ use pgs_interface::profile::Variant;
 pub(crate) struct Limits {
     /// Its profile, formats and inertia.
     pub(crate) variant: Variant,
-    /// Its abilities beyond interface version 1.1.
-    pub(crate) extensions: Extensions,
     /// Whether subnormal numbers count as zero.
     pub(crate) flush_subnormals: bool,
     /// Largest number of bodies, whatever the memory.
@@ -67,7 +64,6 @@ impl Limits {
     pub(crate) fn of(capabilities: &Capabilities) -> Self {
         Self {
             variant: capabilities.variant,
-            extensions: capabilities.extensions,
             flush_subnormals: capabilities.flush_subnormals,
             // An index has to name every body, whatever capacity the bitstream reports.
             body_capacity: capabilities.body_capacity.min(capabilities.variant.body_capacity()),
@@ -84,7 +80,6 @@ impl Limits {
     pub(crate) const fn roomy(variant: Variant) -> Self {
         Self {
             variant,
-            extensions: Extensions::possible(&variant),
             flush_subnormals: false,
             body_capacity: u32::MAX,
             collision_capacity: u32::MAX,
@@ -271,7 +266,6 @@ pub(crate) mod tests {
     };
     pub(crate) const FLOAT: Limits = Limits {
         variant: profile::FLOAT.default_variant(),
-        extensions: Extensions::possible(&profile::FLOAT.default_variant()),
         flush_subnormals: false,
         body_capacity: 131_072,
         collision_capacity: 262_144,

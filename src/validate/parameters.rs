@@ -1,9 +1,7 @@
 //! Refuses step parameters outside their range.
 
-use pgs_interface::extension::Extensions;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::profile::solver::SPIN_DAMPING;
 
 use super::range::{computes_short, smallest_short};
 use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds};
@@ -11,8 +9,8 @@ use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
 
-/// Whether an extension is among these.
-type Has = fn(Extensions) -> bool;
+/// Whether the records of a bitstream hold what a step asks for.
+type Holds = fn(&Variant) -> bool;
 
 /// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
@@ -54,22 +52,15 @@ pub(crate) fn check_parameters(
             return Err(InputError::Parameter { parameter, found, expected });
         }
     }
-    if !limits.extensions.spin_damping && spin_damping.to_bits() != SPIN_DAMPING.to_bits() {
-        let (parameter, found) = ("spin damping", spin_damping);
-        let excess = Excess::FixedParameter { parameter, found, known: SPIN_DAMPING };
-        return Err(needs.refuse(excess, |variant| Extensions::possible(variant).spin_damping));
-    }
     let asked = [
-        ("static bodies that move", parameters.kinematic, (|of| of.kinematic) as Has),
-        ("a friction for each collision", parameters.pair_friction, |of| of.pair_friction),
-        ("a friction for each shape", parameters.shape_friction, |of| of.shape_friction),
-        ("a warm start", parameters.warm_start, |of| of.warm_start),
-        ("the impulses of the collisions", parameters.impulses_out, |of| of.warm_start),
+        ("static bodies that move", parameters.kinematic, Variant::has_kinematic as Holds),
+        ("a friction for each collision", parameters.pair_friction, Variant::has_pair_friction),
+        ("a warm start", parameters.warm_start, Variant::has_impulses),
+        ("the impulses of the collisions", parameters.impulses_out, Variant::has_impulses),
     ];
-    for (extension, wanted, has) in asked {
-        if wanted && !has(limits.extensions) {
-            let excess = Excess::MissingExtension { extension };
-            return Err(needs.refuse(excess, |variant| has(Extensions::possible(variant))));
+    for (asked, wanted, holds) in asked {
+        if wanted && !holds(&limits.variant) {
+            return Err(needs.refuse(Excess::NotInRecords { asked }, holds));
         }
     }
     if computes_short(&limits.variant.numbers) {
@@ -194,21 +185,6 @@ mod tests {
         accepts(&[0.0, 1.0], |parameters, value| parameters.spin_damping = value);
         accepts(&[-1.0, 0.0], |parameters, value| parameters.position_drift = value);
         accepts(&[-1.0, 2.0], |parameters, value| parameters.position_coefficient = value);
-    }
-
-    #[test]
-    fn another_spin_damping_takes_the_extension() {
-        let old = Limits { extensions: Extensions::NONE, ..FLOAT };
-        let mut parameters = StepParameters::default();
-        assert_eq!(check_parameters(&parameters, &NEEDS, &old), Ok(()));
-        parameters.spin_damping = 0.0;
-        assert_eq!(checked(&parameters), Ok(()));
-        let refused = check_parameters(&parameters, &NEEDS, &old).expect_err("version 1.1");
-        assert_eq!(
-            refused.to_string(),
-            "the spin damping is 0, and this bitstream knows 0.1 only: give 0.1, or load one with \
-             this extension of interface 1.2 (profiles that could: naive, float, half)"
-        );
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Refuses collisions with numbers outside the range that a bitstream keeps from stream to solver.
 
-use pgs_interface::extension::Extensions;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
@@ -68,8 +67,7 @@ pub(crate) fn check_impulses(
     let item = InputItem::Collision(index, None);
     let number = OutOfRange { item, field, component, found, format, smallest: 0.0, largest };
     Err(scene.needs.refuse(Excess::OutOfRange(number), |variant| {
-        Extensions::possible(variant).warm_start
-            && impulses.are_within(largest_impulse(&variant.numbers))
+        variant.has_impulses() && impulses.are_within(largest_impulse(&variant.numbers))
     }))
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn check_shapes(
     if shapes.is_empty() {
         return Err(InputError::NoShapes);
     }
-    if exceeds(shapes.len(), limits.shape_capacity) && !limits.extensions.streamed_masses {
+    if exceeds(shapes.len(), limits.shape_capacity) && !limits.variant.has_streamed_masses() {
         return Err(InputError::TooManyShapes {
             found: shapes.len(),
             limit: limits.shape_capacity,
@@ -48,11 +48,6 @@ pub(crate) fn check_shapes(
         if let (true, Some(found)) = (shape.is_static(), [x, y, z].into_iter().find(|k| *k != 0.0))
         {
             return Err(InputError::StaticShapeRotates { shape: index, found });
-        }
-        // A bitstream without frictions of shapes ignores them.
-        let friction = shape.friction;
-        if limits.extensions.shape_friction && !(0.0..=Shape::FRICTION_MAX).contains(&friction) {
-            return Err(InputError::ShapeFriction { shape: index, found: friction });
         }
         if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
             let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
@@ -103,7 +98,6 @@ pub(crate) fn needed(shapes: &[Shape]) -> Inertia {
 mod tests {
     use super::super::tests::{FLOAT, HALF, on};
     use super::*;
-    use pgs_interface::extension::Extensions;
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
 
@@ -131,7 +125,7 @@ mod tests {
     fn more_shapes_than_entries_are_refused() {
         assert_eq!(validated(&[CUBE; 64]), Ok(()));
         assert_eq!(validated(&[CUBE; 65]), Err(InputError::TooManyShapes { found: 65, limit: 64 }));
-        let streams = Limits { extensions: Extensions::ALL, ..FLOAT };
+        let streams = on(FLOAT.variant.profile, Inertia::World);
         assert_eq!(validate_shapes(&[CUBE; 65], &streams), Ok(()));
     }
 
@@ -232,21 +226,6 @@ mod tests {
         let mut table = FLOAT;
         table.variant.numbers.velocities = Precision::Binary16;
         assert_eq!(validate_shapes(&[Shape::isotropic(1.0, 7e4)], &table), Ok(()));
-    }
-
-    #[test]
-    fn a_friction_counts_where_the_table_has_it() {
-        let shape = |friction| Shape::isotropic(1.0, 1.5).with_friction(friction);
-        assert_eq!(validated(&[shape(f32::NAN)]), Ok(()));
-        let with_frictions = Limits { extensions: Extensions::ALL, ..HALF };
-        for found in [-0.5, f32::NAN, f32::INFINITY, 255.5] {
-            assert!(matches!(
-                validate_shapes(&[shape(found)], &with_frictions),
-                Err(InputError::ShapeFriction { shape: 0, .. })
-            ));
-        }
-        let good = [0.0, 0.7, Shape::FRICTION_MAX].map(shape);
-        assert_eq!(validate_shapes(&good, &with_frictions), Ok(()));
     }
 
     #[test]

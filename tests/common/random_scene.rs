@@ -2,18 +2,15 @@
 
 use super::at_rest;
 use super::direct::{Vec3, add, dot, unit};
+use pgs_support::random::SplitMix64;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-/// Numbers that follow no pattern (the finalizer of splitmix64).
-struct Random(u64);
+/// Numbers that follow no pattern.
+struct Random(SplitMix64);
 
 impl Random {
     fn word(&mut self) -> u32 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut word = self.0;
-        word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        u32::try_from((word ^ (word >> 31)) >> 40).expect("24 bits")
+        self.0.word() >> 8
     }
 
     fn below(&mut self, limit: u32) -> u32 {
@@ -56,7 +53,7 @@ pub(crate) fn shapes() -> [Shape; 5] {
 }
 
 pub(crate) fn scene(seed: u64) -> (Vec<Body>, Vec<Collision>) {
-    let mut random = Random(seed);
+    let mut random = Random(SplitMix64::new(seed));
     let mut bodies = vec![at_rest([0.0, -50.0, 0.0], 0)];
     for index in 1..BODIES {
         let [x, y, z] = random.direction();

@@ -82,7 +82,7 @@ fn a_board_as_it_should_be_passes_every_line() {
     let (report, board) = checked(fenced());
     assert!(report.passed());
     assert_eq!(detail(&report, "identification"), "0x50475331 (\"PGS1\")");
-    assert_eq!(detail(&report, "interface version"), "1.3");
+    assert_eq!(detail(&report, "interface version"), "2.0");
     assert!(
         detail(&report, "capabilities")
             .starts_with("profile float, 4 + 4 streams of 128 bits, 275000 kHz")
@@ -251,8 +251,8 @@ fn another_design_is_named_by_its_identification() {
 
 #[test]
 fn another_interface_version_is_named() {
-    let quirks = Quirks { version: 0x0002_0001, ..Quirks::default() };
-    fails(quirks, "interface version", true, ["2.1", "1.x", "driver that belongs"]);
+    let quirks = Quirks { version: 0x0001_0001, ..Quirks::default() };
+    fails(quirks, "interface version", true, ["1.1", "2.x", "driver that belongs"]);
 }
 
 #[test]

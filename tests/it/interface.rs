@@ -176,8 +176,8 @@ fn control_registers_stand_at_their_published_offsets() {
         ]
     );
     assert_eq!(control::IDENTIFICATION_VALUE.to_be_bytes(), *b"PGS1");
-    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (1, 3));
-    assert_eq!(control::VERSION.reset, 0x0001_0003);
+    assert_eq!((control::VERSION_MAJOR, control::VERSION_MINOR), (2, 0));
+    assert_eq!(control::VERSION.reset, 0x0002_0000);
     assert_eq!(control::IMPULSE_SUM_FRACTION_BITS, 20);
     assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
     assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);
@@ -202,20 +202,9 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::flags::WARM_START.mask(), 1 << 3);
     assert_eq!(control::flags::IMPULSES_OUT.mask(), 1 << 4);
     assert_eq!(control::flags::STREAMED_MASSES.mask(), 1 << 5);
-    assert_eq!(control::flags::VELOCITIES_ONLY.mask(), 1 << 6);
-    assert_eq!(control::flags::SHAPE_FRICTION.mask(), 1 << 7);
-    assert_eq!(control::features::CHECKSUMS.mask(), 1 << 0);
-    assert_eq!(control::features::INTERLOCKED.mask(), 1 << 1);
+    assert_eq!(control::features::INTERLOCKED.mask(), 1 << 0);
     assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
-    assert_eq!(control::features::IMPULSE_SUM.mask(), 1 << 3);
-    assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 4);
-    assert_eq!(control::features::SPIN_DAMPING.mask(), 1 << 5);
-    assert_eq!(control::features::KINEMATIC.mask(), 1 << 6);
-    assert_eq!(control::features::PAIR_FRICTION.mask(), 1 << 7);
-    assert_eq!(control::features::WARM_START.mask(), 1 << 8);
-    assert_eq!(control::features::STREAMED_MASSES.mask(), 1 << 9);
-    assert_eq!(control::features::VELOCITIES_ONLY.mask(), 1 << 10);
-    assert_eq!(control::features::SHAPE_FRICTION.mask(), 1 << 11);
+    assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 1);
     let formats = [
         control::numbers::COLLISIONS,
         control::numbers::BODIES,
@@ -251,7 +240,6 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::reset::RESET.mask(), 1);
     assert_eq!((control::SHAPE_TABLE, control::SHAPE_STRIDE), (0x400, 16));
     assert_eq!((control::SHAPE_INVERSE_MASS, control::SHAPE_INVERSE_INERTIA), (0, 4));
-    assert_eq!(control::SHAPE_FRICTION, 8);
 }
 
 #[test]

@@ -10,11 +10,11 @@ mod common;
 #[path = "../vectors/mod.rs"]
 mod vectors;
 
+mod asked;
 mod board_text;
 mod cheapest_order;
 mod check;
 mod empty;
-mod extensions;
 mod float_environment;
 mod forked;
 mod interface;
@@ -26,9 +26,7 @@ mod prepared;
 mod profiles;
 mod refusals;
 mod served;
-mod shape_friction;
 mod shapes;
 mod storage;
 mod warm_start;
 mod widths;
-mod without_poses;

@@ -49,28 +49,19 @@ pub mod flags {
     /// and without gravity.
     pub const INTEGRATE: Field = Field::bit("integrate", 0, Access::ReadWrite);
     /// Bodies of inverse mass 0 have the velocity of their record. Without it they are at rest,
-    /// whatever the record holds. Only in a bitstream with
-    /// [`features::KINEMATIC`](super::features::KINEMATIC).
+    /// whatever the record holds.
     pub const KINEMATIC: Field = Field::bit("kinematic", 1, Access::ReadWrite);
-    /// The friction of a collision is above its contact count, and FRICTION is not used. Only in a
-    /// bitstream with [`features::PAIR_FRICTION`](super::features::PAIR_FRICTION).
+    /// The friction of a collision is above its contact count, and FRICTION is not used. Only where a record has
+    /// room for it ([`Variant::has_pair_friction`](super::super::profile::Variant::has_pair_friction)).
     pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 2, Access::ReadWrite);
     /// Impulses come in with the collisions, in a pass of their own in front of the passes of each
-    /// kind. Only in a bitstream with [`features::WARM_START`](super::features::WARM_START).
+    /// kind.
     pub const WARM_START: Field = Field::bit("warm_start", 3, Access::ReadWrite);
-    /// The impulses go out in front of the results. Only in a bitstream with
-    /// [`features::WARM_START`](super::features::WARM_START).
+    /// The impulses go out in front of the results.
     pub const IMPULSES_OUT: Field = Field::bit("impulses_out", 4, Access::ReadWrite);
-    /// Each velocity record brings the inverse mass of its body, and the shape table is not used. Only in a
-    /// bitstream with [`features::STREAMED_MASSES`](super::features::STREAMED_MASSES).
+    /// Each velocity record brings the inverse mass of its body, and the shape table is not used. Only
+    /// in a bitstream with [`features::WORLD_INERTIA`](super::features::WORLD_INERTIA).
     pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 5, Access::ReadWrite);
-    /// Without [`INTEGRATE`], no poses come in, and the results are velocities alone; with it, this bit has no
-    /// effect. Only in a bitstream with [`features::VELOCITIES_ONLY`](super::features::VELOCITIES_ONLY).
-    pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 6, Access::ReadWrite);
-    /// The friction of a collision is the product of both shapes' frictions, and FRICTION is not used. Without
-    /// effect beside [`STREAMED_MASSES`], whose steps use no shapes. Only in a bitstream with
-    /// [`features::SHAPE_FRICTION`](super::features::SHAPE_FRICTION).
-    pub const SHAPE_FRICTION: Field = Field::bit("shape_friction", 7, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -87,34 +78,12 @@ pub mod version {
 pub mod features {
     use super::{Access, Field};
 
-    /// [`SUM_RECEIVED`](super::SUM_RECEIVED) and [`SUM_SENT`](super::SUM_SENT) count.
-    pub const CHECKSUMS: Field = Field::bit("checksums", 0, Access::ReadOnly);
     /// The pipeline waits on a hazard; without it, it reads stale velocities.
-    pub const INTERLOCKED: Field = Field::bit("interlocked", 1, Access::ReadOnly);
+    pub const INTERLOCKED: Field = Field::bit("interlocked", 0, Access::ReadOnly);
+    /// Velocity records carry the world inverse inertia of their body.
+    pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 1, Access::ReadOnly);
     /// Subnormal operands and results count as zero.
     pub const FLUSH_SUBNORMALS: Field = Field::bit("flush_subnormals", 2, Access::ReadOnly);
-    /// [`IMPULSE_SUM_LO`](super::IMPULSE_SUM_LO) counts.
-    pub const IMPULSE_SUM: Field = Field::bit("impulse_sum", 3, Access::ReadOnly);
-    /// Velocity records carry the world inverse inertia of their body.
-    pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 4, Access::ReadOnly);
-    /// [`SPIN_DAMPING`](super::SPIN_DAMPING) exists; without it the share is its reset value.
-    pub const SPIN_DAMPING: Field = Field::bit("spin_damping", 5, Access::ReadOnly);
-    /// Bodies of inverse mass 0 can move ([`flags::KINEMATIC`](super::flags::KINEMATIC)).
-    pub const KINEMATIC: Field = Field::bit("kinematic", 6, Access::ReadOnly);
-    /// Each collision can have a friction of its own
-    /// ([`flags::PAIR_FRICTION`](super::flags::PAIR_FRICTION)).
-    pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 7, Access::ReadOnly);
-    /// Impulses can come in and go out ([`flags::WARM_START`](super::flags::WARM_START),
-    /// [`flags::IMPULSES_OUT`](super::flags::IMPULSES_OUT)).
-    pub const WARM_START: Field = Field::bit("warm_start", 8, Access::ReadOnly);
-    /// Velocity records with world inertia can bring the inverse mass of their body
-    /// ([`flags::STREAMED_MASSES`](super::flags::STREAMED_MASSES)).
-    pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 9, Access::ReadOnly);
-    /// A step that integrates nothing can do without poses
-    /// ([`flags::VELOCITIES_ONLY`](super::flags::VELOCITIES_ONLY)).
-    pub const VELOCITIES_ONLY: Field = Field::bit("velocities_only", 10, Access::ReadOnly);
-    /// Each shape can have a friction ([`flags::SHAPE_FRICTION`](super::flags::SHAPE_FRICTION)).
-    pub const SHAPE_FRICTION: Field = Field::bit("shape_friction", 11, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -269,8 +238,6 @@ pub const FLAGS: Register = row(
         flags::WARM_START,
         flags::IMPULSES_OUT,
         flags::STREAMED_MASSES,
-        flags::VELOCITIES_ONLY,
-        flags::SHAPE_FRICTION,
     ],
     OURS,
 );
@@ -290,8 +257,7 @@ pub const GRAVITY_X: Register = argument("GRAVITY_X", 0x60);
 pub const GRAVITY_Y: Register = argument("GRAVITY_Y", 0x68);
 /// Gravity along z, m/s², f32.
 pub const GRAVITY_Z: Register = argument("GRAVITY_Z", 0x70);
-/// Share of the spin about the normal that one friction pass takes away, f32. Only in a bitstream
-/// with [`features::SPIN_DAMPING`]. Its value after a reset is the share of every other bitstream.
+/// Share of the spin about the normal that one friction pass takes away, f32.
 pub const SPIN_DAMPING: Register = row(
     "SPIN_DAMPING",
     0x78,
@@ -304,9 +270,9 @@ pub const SPIN_DAMPING: Register = row(
 /// "PGS1" as text, first letter in the most significant byte.
 pub const IDENTIFICATION_VALUE: u32 = 0x5047_5331;
 /// Major interface version of this module.
-pub const VERSION_MAJOR: u32 = 1;
+pub const VERSION_MAJOR: u32 = 2;
 /// Minor interface version of this module.
-pub const VERSION_MINOR: u32 = 3;
+pub const VERSION_MINOR: u32 = 0;
 
 /// Always [`IDENTIFICATION_VALUE`].
 pub const IDENTIFICATION: Register =
@@ -326,20 +292,7 @@ pub const PROFILE: Register = read_only("PROFILE", 0x108, &[]);
 pub const FEATURES: Register = read_only(
     "FEATURES",
     0x10C,
-    &[
-        features::CHECKSUMS,
-        features::INTERLOCKED,
-        features::FLUSH_SUBNORMALS,
-        features::IMPULSE_SUM,
-        features::WORLD_INERTIA,
-        features::SPIN_DAMPING,
-        features::KINEMATIC,
-        features::PAIR_FRICTION,
-        features::WARM_START,
-        features::STREAMED_MASSES,
-        features::VELOCITIES_ONLY,
-        features::SHAPE_FRICTION,
-    ],
+    &[features::INTERLOCKED, features::WORLD_INERTIA, features::FLUSH_SUBNORMALS],
 );
 /// Numbers of streams.
 pub const CHANNELS: Register = read_only("CHANNELS", 0x110, &[channels::MM2S, channels::S2MM]);
@@ -440,12 +393,8 @@ pub const SHAPE_STRIDE: u32 = 16;
 /// Offset in an entry of the inverse mass, 1/kg, f32; 0 is static.
 pub const SHAPE_INVERSE_MASS: u32 = 0x0;
 /// Offset in an entry of the isotropic inverse inertia, 1/(kg m²), f32; without meaning to a
-/// bitstream with world inertia.
+/// bitstream with world inertia. The last two words of the entry are reserved and written 0.
 pub const SHAPE_INVERSE_INERTIA: u32 = 0x4;
-/// Offset of the friction in an entry, f32. Only in a bitstream with [`features::SHAPE_FRICTION`], else
-/// reserved and written 0. The last word of the entry is reserved and written 0.
-pub const SHAPE_FRICTION: u32 = 0x8;
-
 /// Every register outside the shape table, by offset.
 pub const REGISTERS: &[Register] = &[
     AP_CTRL,

@@ -8,7 +8,6 @@ pub mod address_map;
 pub mod axi_dma;
 pub mod control;
 pub mod descriptor;
-pub mod extension;
 pub mod fence;
 pub mod message;
 pub mod number;

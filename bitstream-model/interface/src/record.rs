@@ -119,13 +119,3 @@ pub mod result {
     /// Angular velocity; the word beside it is 0.
     pub const ANGULAR: usize = 3;
 }
-
-/// The result record of a step without poses: rows.
-pub mod velocity_result {
-    /// Rows of a record.
-    pub const ROWS: usize = 2;
-    /// Linear velocity; the word beside it is 0.
-    pub const LINEAR: usize = 0;
-    /// Angular velocity; the word beside it is 0.
-    pub const ANGULAR: usize = 1;
-}

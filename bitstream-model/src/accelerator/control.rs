@@ -9,15 +9,13 @@ use pgs_interface::control::{
     FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER,
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
     MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS,
-    SHAPE_CAPACITY, SHAPE_FRICTION, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE,
-    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES,
-    WORK_CYCLES, ap_ctrl, channels, depth, dma, error, features, flags, irq, issue,
-    memory_per_record, numbers,
+    SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
+    SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
+    channels, depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
 };
-use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::Numbers;
-use pgs_interface::profile::{Depth, Inertia};
+use pgs_interface::profile::{Depth, Inertia, Variant};
 
 use super::integrate::Integration;
 use super::solver::SolverParameters;
@@ -47,7 +45,6 @@ pub(crate) struct Shape {
     pub(crate) inverse_mass: f32,
     /// Isotropic; unused with world inertia.
     pub(crate) inverse_inertia: f32,
-    pub(crate) friction: f32,
 }
 
 /// The accelerator's counters of a step.
@@ -72,8 +69,6 @@ pub(crate) struct Arguments {
     pub(crate) integrate: bool,
     /// Whether bodies of inverse mass 0 have the velocity of their record.
     pub(crate) kinematic: bool,
-    /// Whether no poses come in, and velocities go out alone.
-    pub(crate) velocities_only: bool,
     /// Whether each body brings its inverse mass, in place of its shape's.
     pub(crate) streamed_masses: bool,
     /// Whether impulses come in with the collisions, in a pass in front of the others of each kind.
@@ -128,7 +123,7 @@ pub(super) enum Request {
 /// The register file.
 #[derive(Debug)]
 pub(super) struct Registers {
-    extensions: Extensions,
+    variant: Variant,
     arguments: [u32; ARGUMENT_WORDS],
     gie: bool,
     ier: u32,
@@ -141,8 +136,8 @@ pub(super) struct Registers {
     pub(super) counters: Counters,
 }
 
-/// Offsets of the arguments of every board. `Registers::arguments` holds each at a quarter of its offset.
-const ARGUMENTS: [u32; 13] = [
+/// Offsets of the arguments. `Registers::arguments` holds each at a quarter of its offset.
+const ARGUMENTS: [u32; 14] = [
     BODIES.offset,
     COLLISIONS.offset,
     CONTACT_ITERATIONS.offset,
@@ -156,6 +151,7 @@ const ARGUMENTS: [u32; 13] = [
     GRAVITY_X.offset,
     GRAVITY_Y.offset,
     GRAVITY_Z.offset,
+    SPIN_DAMPING.offset,
 ];
 
 const _: () = assert!(SPIN_DAMPING.offset as usize / 4 < ARGUMENT_WORDS);
@@ -170,7 +166,7 @@ const ARGUMENTS_AT_RESET: [u32; ARGUMENT_WORDS] = {
 impl Registers {
     pub(super) fn new(config: &BoardConfig) -> Self {
         Self {
-            extensions: config.built_extensions(),
+            variant: config.variant(),
             arguments: ARGUMENTS_AT_RESET,
             gie: false,
             ier: 0,
@@ -197,12 +193,6 @@ impl Registers {
         self.shapes.fill(Shape::default());
     }
 
-    /// Whether this board has an argument at the offset.
-    fn has_argument(&self, offset: u32) -> bool {
-        ARGUMENTS.contains(&offset)
-            || (offset == SPIN_DAMPING.offset && self.extensions.spin_damping)
-    }
-
     fn argument(&self, offset: u32) -> u32 {
         self.arguments[offset as usize / 4]
     }
@@ -214,32 +204,24 @@ impl Registers {
     pub(super) fn arguments(&self) -> Arguments {
         let time_step = self.number(TIME_STEP.offset);
         let set = self.argument(FLAGS.offset);
-        let integrate = flags::INTEGRATE.is_set(set);
-        let has = self.extensions;
-        let streamed_masses = has.streamed_masses && flags::STREAMED_MASSES.is_set(set);
+        let variant = &self.variant;
         Arguments {
             bodies: self.argument(BODIES.offset),
             collisions: self.argument(COLLISIONS.offset),
             contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
-            integrate,
-            velocities_only: has.velocities_only
-                && !integrate
-                && flags::VELOCITIES_ONLY.is_set(set),
-            kinematic: has.kinematic && flags::KINEMATIC.is_set(set),
-            streamed_masses,
-            warm_start: has.warm_start && flags::WARM_START.is_set(set),
-            impulses_out: has.warm_start && flags::IMPULSES_OUT.is_set(set),
+            integrate: flags::INTEGRATE.is_set(set),
+            kinematic: variant.has_kinematic() && flags::KINEMATIC.is_set(set),
+            streamed_masses: variant.has_streamed_masses() && flags::STREAMED_MASSES.is_set(set),
+            warm_start: variant.has_impulses() && flags::WARM_START.is_set(set),
+            impulses_out: variant.has_impulses() && flags::IMPULSES_OUT.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),
                 coefficient: self.number(POSITION_COEFFICIENT.offset),
                 friction: self.number(FRICTION.offset),
                 spin_damping: self.number(SPIN_DAMPING.offset),
-                pair_friction: has.pair_friction && flags::PAIR_FRICTION.is_set(set),
-                shape_friction: has.shape_friction
-                    && !streamed_masses
-                    && flags::SHAPE_FRICTION.is_set(set),
+                pair_friction: variant.has_pair_friction() && flags::PAIR_FRICTION.is_set(set),
             },
             integration: Integration {
                 time_step,
@@ -315,7 +297,6 @@ impl Registers {
             return Some(match at {
                 SHAPE_INVERSE_MASS => shape.inverse_mass.to_bits(),
                 SHAPE_INVERSE_INERTIA => shape.inverse_inertia.to_bits(),
-                SHAPE_FRICTION => shape.friction.to_bits(),
                 _ => 0,
             });
         }
@@ -324,19 +305,15 @@ impl Registers {
             _ if offset == GIE.offset => u32::from(self.gie),
             _ if offset == IER.offset => self.ier,
             _ if offset == ISR.offset => self.isr,
-            _ if self.has_argument(offset) => self.argument(offset),
+            _ if ARGUMENTS.contains(&offset) => self.argument(offset),
             _ if offset == IDENTIFICATION.offset => config.quirks.identification,
             _ if offset == VERSION.offset => config.quirks.version,
             _ if offset == PROFILE.offset => profile.id,
             _ if offset == FEATURES.offset => {
-                features::CHECKSUMS.mask()
-                    | features::IMPULSE_SUM.mask()
-                    | features::INTERLOCKED
-                        .put(0, u32::from(config.hazards == Hazards::Interlocked))
+                features::INTERLOCKED.put(0, u32::from(config.hazards == Hazards::Interlocked))
                     | features::FLUSH_SUBNORMALS
                         .put(0, u32::from(config.subnormals == Subnormals::Flush))
                     | features::WORLD_INERTIA.put(0, u32::from(config.inertia == Inertia::World))
-                    | self.extensions.features()
             }
             _ if offset == CHANNELS.offset => {
                 let mm2s = register(profile.mm2s_widths.len());
@@ -395,7 +372,7 @@ impl Registers {
 
     /// Whether a write to this register is an error while a step runs.
     pub(super) fn is_argument(&self, offset: u32) -> bool {
-        self.has_argument(offset) || self.shape_at(offset).is_some()
+        ARGUMENTS.contains(&offset) || self.shape_at(offset).is_some()
     }
 
     /// Writes a register; `None` if no register has this offset.
@@ -405,7 +382,6 @@ impl Registers {
             match at {
                 SHAPE_INVERSE_MASS => shape.inverse_mass = number,
                 SHAPE_INVERSE_INERTIA => shape.inverse_inertia = number,
-                SHAPE_FRICTION if self.extensions.shape_friction => shape.friction = number,
                 _ => {}
             }
             return Some(Request::None);
@@ -420,10 +396,8 @@ impl Registers {
                 self.ier = value & (irq::DONE.mask() | irq::READY.mask() | irq::ERROR.mask());
             }
             _ if offset == ISR.offset => self.isr ^= value & self.ier,
-            _ if self.has_argument(offset) => self.arguments[offset as usize / 4] = value,
+            _ if ARGUMENTS.contains(&offset) => self.arguments[offset as usize / 4] = value,
             _ if offset == RESET.offset && value & 1 != 0 => return Some(Request::Reset),
-            // An argument that this board lacks.
-            _ if offset == SPIN_DAMPING.offset => return None,
             _ => {
                 // The rest is read-only or does not exist.
                 return pgs_interface::control::REGISTERS

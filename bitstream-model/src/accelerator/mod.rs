@@ -65,8 +65,6 @@ pub(crate) enum Phase {
         poses: Segment,
         results: Results,
     },
-    /// In a step without poses the velocities go out.
-    SendVelocities(Results),
     /// The last results are on their way out.
     Ending,
     Failed,
@@ -266,7 +264,6 @@ impl Accelerator {
                 })
             }
             Phase::Integrate { .. } => Some(Stage::Integrate),
-            Phase::SendVelocities(_) => Some(Stage::SendVelocities),
         };
         stages.note(stage, clock, counts);
     }
@@ -352,7 +349,6 @@ impl Accelerator {
                     let deferral = deferral.as_deref_mut();
                     self.integrate(poses, results, inputs, outputs, memory, deferral)
                 }
-                Phase::SendVelocities(results) => Ok(self.send_velocities(results, outputs)),
                 Phase::Ending => {
                     self.phase = Phase::Idle;
                     self.end_step();
@@ -405,7 +401,6 @@ impl Accelerator {
                 self.hung |= faults.keeps_done();
                 return self.hung;
             }
-            Phase::SendVelocities(_) => (Some(StepPhase::Results), None),
             Phase::Load(segment) => (Some(StepPhase::Load), Some(segment)),
             Phase::Pass { number, segment } => {
                 let pass = StepPhase::of_pass(*number, self.arguments.contact_passes());

@@ -122,7 +122,7 @@ impl Accelerator {
             Inertia::Isotropic => [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
             Inertia::World => inertia,
         };
-        Mass { inverse_mass: shape.inverse_mass, inverse_inertia, friction: shape.friction }
+        Mass { inverse_mass: shape.inverse_mass, inverse_inertia }
     }
 
     /// Computes a pass over one collision: velocities and impulses become the ones written back.

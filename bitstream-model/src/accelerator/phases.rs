@@ -18,7 +18,7 @@ use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Inertia, Variant};
-use pgs_interface::record::{CONTACT_POINTS, collision, pose, result, velocity_result};
+use pgs_interface::record::{CONTACT_POINTS, collision, pose, result};
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Collisions of a pass that have arrived, and for how many cycles they may enter.
@@ -45,14 +45,11 @@ impl Accelerator {
         Segment::new(Array::new(striping, records))
     }
 
-    /// The poses; none in a step without them.
+    /// The poses.
     pub(super) fn poses_in(&self) -> Segment {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.poses, profile.mm2s_widths);
-        let mut records = self.body_records(numbers.poses, pose::ROWS);
-        if self.arguments.velocities_only {
-            records.count = 0;
-        }
+        let records = self.body_records(numbers.poses, pose::ROWS);
         Segment::new(Array::new(striping, records))
     }
 
@@ -76,11 +73,7 @@ impl Accelerator {
     pub(super) fn results_out(&self) -> Results {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.results, profile.s2mm_widths);
-        let rows = match self.arguments.velocities_only {
-            true => velocity_result::ROWS,
-            false => result::ROWS,
-        };
-        Results::new(Array::new(striping, self.body_records(numbers.poses, rows)))
+        Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
     }
 
     pub(crate) fn received(&mut self, sum: u32) {
@@ -164,10 +157,7 @@ impl Accelerator {
                 defer.compute(self, number, 0);
             }
             let (poses, results) = (self.poses_in(), self.results_out());
-            self.phase = match self.arguments.velocities_only {
-                true => Phase::SendVelocities(results),
-                false => Phase::Integrate { poses, results },
-            };
+            self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
@@ -463,31 +453,6 @@ impl Accelerator {
             Phase::Integrate { poses, results }
         };
         Ok(true)
-    }
-
-    /// Sends velocities as far as the streams have space for them, a beat a cycle on each stream of 128
-    /// bits. Returns whether any went out.
-    pub(super) fn send_velocities(&mut self, mut results: Results, outputs: &mut [Stream]) -> bool {
-        let records = results.room(outputs);
-        if records == 0 {
-            return false;
-        }
-        let before = results.cycles();
-        let first = self.velocities.len() - results.left();
-        let mut sent = 0_u32;
-        for velocity in &self.velocities[first..first + records] {
-            let rows = decode::velocity_result(self.variant.numbers.poses, velocity);
-            sent = sent.wrapping_add(results.send(&rows, outputs));
-        }
-        self.sent(sent);
-        self.debt += results.cycles() - before;
-        self.phase = if results.left() == 0 {
-            self.debt += u64::from(self.variant.profile.integration_fill);
-            Phase::Ending
-        } else {
-            Phase::SendVelocities(results)
-        };
-        true
     }
 
     /// Integrates the next bodies and sends their results; the sum of all words that were sent.

@@ -20,8 +20,6 @@ use pgs_interface::record::CONTACT_POINTS;
 pub(crate) struct Mass {
     pub(crate) inverse_mass: f32,
     pub(crate) inverse_inertia: Stored,
-    /// Friction of the body's shape.
-    pub(crate) friction: f32,
 }
 
 impl Mass {
@@ -31,7 +29,6 @@ impl Mass {
         Self {
             inverse_mass: round(self.inverse_mass),
             inverse_inertia: self.inverse_inertia.map(round),
-            friction: round(self.friction),
         }
     }
 }
@@ -58,8 +55,6 @@ pub(crate) struct SolverParameters {
     pub(crate) spin_damping: f32,
     /// Whether each collision has a friction of its own, in place of `friction`.
     pub(crate) pair_friction: bool,
-    /// Whether the friction of a collision is the product of both shapes', in place of `friction`.
-    pub(crate) shape_friction: bool,
 }
 
 impl SolverParameters {
@@ -73,7 +68,6 @@ impl SolverParameters {
             friction: round(self.friction),
             spin_damping: round(self.spin_damping),
             pair_friction: self.pair_friction,
-            shape_friction: self.shape_friction,
         }
     }
 }
@@ -270,13 +264,9 @@ pub(crate) fn friction<R: Format, U: Format, I: Inertia>(
     let centre = sum * (Number::new(1.0) / Number::new(collision.count as f32));
     let arm_a = centre - position_a;
     let arm_b = centre - position_b;
-    let mu = match parameters {
-        SolverParameters { pair_friction: true, .. } => Number::<U>::new(collision.friction),
-        SolverParameters { shape_friction: true, .. } => {
-            let [a, b] = masses.map(|mass| Number::new(mass.friction));
-            a * b
-        }
-        _ => Number::new(parameters.friction),
+    let mu = match parameters.pair_friction {
+        true => Number::<U>::new(collision.friction),
+        false => Number::new(parameters.friction),
     };
     let limit = mu * Number::new(impulses[0]);
     for (k, (t, accumulated)) in tangents(q).into_iter().zip(&mut impulses[1..3]).enumerate() {
@@ -315,7 +305,7 @@ mod tests {
     use crate::accelerator::arithmetic::inertia::Isotropic;
     use crate::accelerator::arithmetic::number::Single;
 
-    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6], friction: 0.0 };
+    const UNIT: Mass = Mass { inverse_mass: 1.0, inverse_inertia: [0.0; 6] };
     const GROUND: Mass = Mass { inverse_mass: 0.0, ..UNIT };
     const PARAMETERS: SolverParameters = SolverParameters {
         time_step: 0.5,
@@ -324,7 +314,6 @@ mod tests {
         friction: 0.5,
         spin_damping: 0.1,
         pair_friction: false,
-        shape_friction: false,
     };
 
     /// A point mass above the ground, normal from B (the mass) down to A (the ground).

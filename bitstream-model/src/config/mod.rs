@@ -11,7 +11,6 @@ use pgs_interface::address_map::CONTROL_BYTES;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
-use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{Depth, FLOAT, Inertia, Profile, Variant};
@@ -118,8 +117,6 @@ pub struct BoardConfig {
     pub numbers: Option<Numbers>,
     /// Form in which it gets the inertia of its bodies.
     pub inertia: Inertia,
-    /// Its abilities beyond interface version 1.1; the ones that the profile cannot have are left out.
-    pub extensions: Extensions,
     /// Behaviour on read-after-write hazards.
     pub hazards: Hazards,
     /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
@@ -156,14 +153,13 @@ pub struct BoardConfig {
 
 impl Default for BoardConfig {
     /// The `float` profile, interlocked, sustained bandwidth of the ZCU102, 26-bit lengths, 40-bit
-    /// addresses, no fence (so that memory lies on both sides of 4 GiB), every extension, strict,
-    /// nothing built wrongly.
+    /// addresses, no fence (so that memory lies on both sides of 4 GiB), strict, nothing built
+    /// wrongly.
     fn default() -> Self {
         Self {
             profile: &FLOAT,
             numbers: None,
             inertia: Inertia::Isotropic,
-            extensions: Extensions::ALL,
             hazards: Hazards::Interlocked,
             window_slots: None,
             subnormals: Subnormals::Keep,
@@ -252,12 +248,6 @@ impl BoardConfig {
             numbers: self.numbers.unwrap_or(self.profile.numbers),
             inertia: self.inertia,
         }
-    }
-
-    /// The abilities that the board has.
-    #[must_use]
-    pub fn built_extensions(&self) -> Extensions {
-        self.extensions.and(Extensions::possible(&self.variant()))
     }
 
     /// Depth of one kind of pass on this board: a pass ends no sooner than its last write-back.

@@ -34,7 +34,6 @@ use crate::config::{BoardConfig, Hazards, Subnormals};
 use pgs_interface::control::{
     FEATURES, FENCE_BASE, FENCE_SIZE, IDENTIFICATION, IDENTIFICATION_VALUE, features,
 };
-use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::profile::{FLOAT, Inertia};
 use pgs_interface::record::Beat;
@@ -81,8 +80,7 @@ impl SimulatorProcess {
     }
 
     /// Starts a simulator as the accelerator of a board that is built as `config` says. The board
-    /// treats subnormal numbers as the simulator does, has the fence that it reports, and no extension that
-    /// it lacks.
+    /// treats subnormal numbers as the simulator does, has the fence that it reports.
     ///
     /// # Errors
     /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] and
@@ -110,7 +108,6 @@ impl SimulatorProcess {
             true => Subnormals::Flush,
             false => Subnormals::Keep,
         };
-        config.extensions = config.extensions.and(Extensions::reported(features));
         let fence = [simulator.read(FENCE_BASE.offset)?, simulator.read(FENCE_SIZE.offset)?];
         config.fence = Fence::from_registers(fence).unwrap_or_default();
         Ok(simulator)

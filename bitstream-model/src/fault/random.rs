@@ -4,22 +4,16 @@ use super::{Fault, FaultKind, FaultPlan, Place, Site, StepPhase, When};
 use crate::cast::{index, register};
 use crate::config::BoardConfig;
 use pgs_interface::axi_dma::Direction;
+use pgs_support::random::SplitMix64;
 
-/// Numbers from a seed (Steele, Lea and Flood: splitmix64).
+/// Numbers from a seed.
 #[derive(Debug)]
-struct Numbers(u64);
+struct Numbers(SplitMix64);
 
 impl Numbers {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
     fn below(&mut self, end: usize) -> usize {
         // The slight preference for low numbers does not matter here.
-        index(self.next() % end.max(1) as u64)
+        index(self.0.next() % end.max(1) as u64)
     }
 
     fn of<T: Copy>(&mut self, all: &[T]) -> Option<T> {
@@ -32,7 +26,7 @@ impl FaultPlan {
     /// gives the same plan.
     #[must_use]
     pub fn random(seed: u64, config: &BoardConfig, contact: u32, friction: u32) -> Self {
-        let mut numbers = Numbers(seed);
+        let mut numbers = Numbers(SplitMix64::new(seed));
         let kinds: Vec<FaultKind> = FaultKind::all().collect();
         let count = 1 + numbers.below(8).saturating_sub(5);
         let mut faults = Vec::new();

@@ -159,8 +159,6 @@ pub enum Stage {
     Friction(u32),
     /// Poses go in, and the results of integrated bodies come out.
     Integrate,
-    /// Velocities come out.
-    SendVelocities,
 }
 
 /// A stage, its time and its part of the counters.

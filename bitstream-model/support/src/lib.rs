@@ -30,6 +30,7 @@ pub mod chunks;
 pub mod float_env;
 pub mod lanes;
 mod process;
+pub mod random;
 #[cfg(test)]
 mod tests;
 

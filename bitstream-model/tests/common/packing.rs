@@ -4,7 +4,7 @@
 use half::f16;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::{Inertia, Variant};
-use pgs_interface::record::{BEAT_BYTES, Beat, collision};
+use pgs_interface::record::{BEAT_BYTES, Beat, collision, result};
 use pgs_interface::stripe::Stripe;
 
 use super::scene::{Body, Collision, Lane, Step};
@@ -137,8 +137,8 @@ impl Step {
         let mut collisions = records.concat();
         let issue = profile.collisions_per_issue as usize * collision::ROWS;
         collisions.resize(collisions.len().next_multiple_of(issue), [0; 4]);
-        let with_poses = self.bodies.iter().filter(|_| !self.velocities_only);
-        let poses: Vec<Row> = with_poses.flat_map(|body| pose_rows(numbers.poses, body)).collect();
+        let poses: Vec<Row> =
+            self.bodies.iter().flat_map(|body| pose_rows(numbers.poses, body)).collect();
         let stripes = &profile.stripes;
         // The collisions with the impulses of a kind, where they have a stripe.
         let with_impulses = |kind: usize| {
@@ -247,37 +247,23 @@ pub(crate) fn impulse_beats(step: &Step) -> usize {
 
 /// Beats on each stream that a step gives out.
 pub(crate) fn beats_out(variant: &Variant, step: &Step) -> Vec<usize> {
-    let mut beats = beats_of_results(variant, step.bodies.len(), rows_out(step.velocities_only));
+    let mut beats = result_beats(variant, step.bodies.len());
     beats[0] += impulse_beats(step);
     beats
 }
 
-/// Rows of a result.
-pub(crate) fn rows_out(velocities_only: bool) -> usize {
-    if velocities_only { 2 } else { 4 }
-}
-
 /// Result beats on each stream.
 pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
-    beats_of_results(variant, bodies, 4)
-}
-
-/// Beats on each stream of results of `rows` rows.
-pub(crate) fn beats_of_results(variant: &Variant, bodies: usize, rows: usize) -> Vec<usize> {
     let bits = variant.numbers.poses.bits() as usize;
-    let all = vec![Beat::default(); bodies * rows * 4 * bits / (8 * BEAT_BYTES)];
+    let all = vec![Beat::default(); bodies * result::ROWS * 4 * bits / (8 * BEAT_BYTES)];
     let profile = variant.profile;
     let dealt = deal(&profile.stripes.results, profile.s2mm_widths.len(), all);
     dealt.iter().map(Vec::len).collect()
 }
 
-/// The bodies from the result beats of all streams, with results of two or four rows. Shapes are not part
-/// of a result and read 0, as poses do in one of two rows. The other beats are padding and must be zeros.
-pub(crate) fn unpack(
-    variant: &Variant,
-    streams: &[Box<[Beat]>],
-    (bodies, in_result): (usize, usize),
-) -> Vec<Body> {
+/// The bodies from the result beats of all streams. Shapes are not part of a result and read 0. The other
+/// beats are padding and must be zeros.
+pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
     let format = variant.numbers.poses;
     let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();
     let mut rows = Vec::new();
@@ -292,21 +278,18 @@ pub(crate) fn unpack(
         }
     }
     assert!(next.into_iter().all(|mut left| left.next().is_none()), "beats in stripes");
-    let padding = rows.split_off(in_result * bodies);
+    let padding = rows.split_off(result::ROWS * bodies);
     assert!(padding.iter().all(|row| *row == [0; 4]), "padding is zeros");
     let vec3 = |[x, y, z, word]: Row| {
         assert_eq!(word, 0, "the fourth word of a result is 0");
         [x, y, z].map(|word| decode(format, word))
     };
-    let body = |rows: &[Row]| {
-        let (pose, velocity) = rows.split_at(in_result - 2);
-        Body {
-            shape: 0,
-            position: pose.first().map_or([0.0; 3], |row| vec3(*row)),
-            orientation: pose.last().map_or([0.0; 4], |row| row.map(|word| decode(format, word))),
-            linear: vec3(velocity[0]),
-            angular: vec3(velocity[1]),
-        }
+    let body = |rows: &[Row]| Body {
+        shape: 0,
+        position: vec3(rows[result::POSITION]),
+        orientation: rows[result::ORIENTATION].map(|word| decode(format, word)),
+        linear: vec3(rows[result::LINEAR]),
+        angular: vec3(rows[result::ANGULAR]),
     };
-    rows.chunks_exact(in_result).map(body).collect()
+    rows.chunks_exact(result::ROWS).map(body).collect()
 }

@@ -60,8 +60,6 @@ pub(crate) struct Step {
     /// Contact and friction passes.
     pub(crate) iterations: [u32; 2],
     pub(crate) integrate: bool,
-    /// Without poses; only in a step that is not integrated.
-    pub(crate) velocities_only: bool,
     pub(crate) time_step: f32,
     pub(crate) drift: f32,
     pub(crate) coefficient: f32,
@@ -84,7 +82,6 @@ impl Step {
             masses: Vec::new(),
             iterations: [4, 4],
             integrate: true,
-            velocities_only: false,
             time_step: 0.5,
             drift: 0.0,
             coefficient: 0.0,
@@ -148,7 +145,6 @@ impl Step {
         let word = flags::WARM_START.put(word, (!self.impulses.is_empty()).into());
         let word = flags::STREAMED_MASSES.put(word, (!self.masses.is_empty()).into());
         let word = flags::IMPULSES_OUT.put(word, self.impulses_out.into());
-        let word = flags::VELOCITIES_ONLY.put(word, self.velocities_only.into());
         host.set_control(control::FLAGS, word);
         let [x, y, z] = self.gravity;
         for (register, value) in [
@@ -263,7 +259,7 @@ pub(crate) fn result_beats(bodies: usize) -> Vec<usize> {
 
 /// The bodies from the result beats of the streams of `float`.
 pub(crate) fn unpack(streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
-    packing::unpack(&FLOAT.default_variant(), streams, (bodies, 4))
+    packing::unpack(&FLOAT.default_variant(), streams, bodies)
 }
 
 /// A body as bits, for comparisons that see the sign of zero.

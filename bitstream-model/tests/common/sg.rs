@@ -8,7 +8,7 @@ use pgs_interface::control::{self, ap_ctrl, irq};
 use pgs_interface::descriptor::status;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-use super::packing::{beats_of_results, beats_out, rows_out, unpack};
+use super::packing::{beats_out, result_beats, unpack};
 use super::ring::{EOF, Ring, SOF};
 use super::scene::{Body, Lane, Step};
 use super::{BOTH, Host, microseconds};
@@ -56,16 +56,9 @@ pub(crate) struct Flight {
     outputs: Vec<u64>,
     /// The last result descriptor of each channel that has results.
     last: Vec<Option<usize>>,
-    /// Whether the results are velocities alone.
-    velocities_only: bool,
 }
 
 impl Flight {
-    /// The flight of a step, without buffers.
-    pub(crate) fn of(step: &Step) -> Self {
-        Self { velocities_only: step.velocities_only, ..Self::default() }
-    }
-
     /// Adds a buffer with input.
     pub(crate) fn input(&mut self, address: u64) {
         self.inputs.push(address);
@@ -234,8 +227,7 @@ impl Machine {
         let sum_of_results =
             streams.iter().fold(0, |sum, beats| super::scene::sum_words(sum, beats));
         // They are in front of the results.
-        let rows = rows_out(flight.velocities_only);
-        let results = beats_of_results(&host.variant(), bodies, rows)[0];
+        let results = result_beats(&host.variant(), bodies)[0];
         let mut impulses = std::mem::take(&mut streams[0]).into_vec();
         streams[0] = impulses.split_off(impulses.len() - results).into();
         let pair = |low, high| u64::from(host.control(low)) | (u64::from(host.control(high)) << 32);
@@ -243,7 +235,7 @@ impl Machine {
         let work = u64::from(host.control(control::WORK_CYCLES));
         let waits = u64::from(host.control(control::WAIT_CYCLES));
         Outcome {
-            bodies: unpack(&host.variant(), &streams, (bodies, rows)),
+            bodies: unpack(&host.variant(), &streams, bodies),
             impulses,
             cycles,
             // A board without power reads as all ones.
@@ -266,7 +258,7 @@ impl Machine {
     /// Runs a step until its results are in memory. The board alone computes.
     pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
         step.write_arguments(&self.host);
-        let mut flight = Flight::of(step);
+        let mut flight = Flight::default();
         let beats = beats_out(&self.host.variant(), step);
         self.arm(&mut flight, &beats);
         self.start();

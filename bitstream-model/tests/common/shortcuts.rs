@@ -196,9 +196,6 @@ pub(crate) fn scene(bodies: u32, collisions: u32, seed: u64, apart: bool) -> Ste
 pub(crate) fn extended(mut step: Step, bits: u8, seed: u64, profile: &Profile) -> Step {
     let of = |n: usize, k: u64| unit(seed ^ 0x99, 16 * n as u64 + k);
     let has = |bit: u8| bits >> bit & 1 == 1;
-    if has(4) && has(5) {
-        (step.integrate, step.velocities_only) = (false, true);
-    }
     if has(3) {
         // A body of the static shape has no mass, and a shape beyond the table does not matter.
         let mass = |(n, body): (usize, &Body)| match body.shape {
@@ -234,7 +231,7 @@ pub(crate) fn begin(
 ) -> (Flight, Vec<Vec<u64>>) {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
-    let mut flight = Flight::of(step);
+    let mut flight = Flight::default();
     machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     let mut addresses = Vec::new();
@@ -260,7 +257,7 @@ pub(crate) fn begin(
 pub(crate) fn begin_once(machine: &mut Machine, step: &Step) -> Flight {
     let variant = machine.host.variant();
     step.write_arguments(&machine.host);
-    let mut flight = Flight::of(step);
+    let mut flight = Flight::default();
     machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     machine.send(&mut flight, &step.packed(&variant));

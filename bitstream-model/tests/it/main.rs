@@ -20,4 +20,3 @@ mod scatter_gather;
 mod shortcuts;
 mod shortcuts_buffers;
 mod shortcuts_warm;
-mod velocities_only;

@@ -272,7 +272,7 @@ fn take_late(late: bool, step: &Step) -> Recording {
     }
     step.write_arguments(&machine.host);
     let variant = machine.host.variant();
-    let mut flight = Flight::of(step);
+    let mut flight = Flight::default();
     machine.arm(&mut flight, &beats_out(&variant, step));
     machine.start();
     machine.send(&mut flight, &step.packed(&variant));

@@ -8,7 +8,6 @@ use pgs_interface::axi_dma::{
 };
 use pgs_interface::control;
 use pgs_interface::descriptor::status;
-use pgs_interface::extension::Extensions;
 
 use crate::common::ring::{Ring, WHOLE, halves};
 use crate::common::{BOTH, CORES, Host, numbered};
@@ -194,18 +193,6 @@ fn curdesc_is_cut_to_bits_31_6_and_ignored_while_running() {
         let kind = ViolationKind::CurdescWhileRunning { core: 0, direction };
         assert_eq!(host.violations(), [kind, kind]);
     }
-}
-
-#[test]
-fn a_board_without_an_extension_lacks_its_register() {
-    let config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };
-    let host = Host::lenient(config);
-    let address = CONTROL_BASE + 0x78;
-    host.port.write32(address, u32::MAX);
-    assert_eq!(host.port.read32(address), 0);
-    let kind = ViolationKind::ReservedRegister { address };
-    assert_eq!(host.violations(), [kind, kind]);
-    assert_eq!(host.control(control::FEATURES), 0b1011);
 }
 
 #[test]
@@ -416,10 +403,10 @@ fn time_can_run_to_its_end_without_harm() {
 fn misread_identity_is_impossible_on_a_live_board() {
     let host = Host::new(BoardConfig::default());
     assert_eq!(host.control(control::IDENTIFICATION), 0x5047_5331);
-    assert_eq!(host.control(control::VERSION), 0x0001_0003);
+    assert_eq!(host.control(control::VERSION), 0x0002_0000);
     assert_eq!(host.control(control::PROFILE), 1);
-    // Checksums, interlocked, impulse sum; spin damping, kinematic, pair friction, warm start, no poses.
-    assert_eq!(host.control(control::FEATURES), 0b101_1110_1011);
+    // Interlocked.
+    assert_eq!(host.control(control::FEATURES), 0b1);
     assert_eq!(host.control(control::CHANNELS), 0x0404);
     // 16 bytes are 2^4.
     assert_eq!(host.control(control::MM2S_WIDTHS), 0x4444);

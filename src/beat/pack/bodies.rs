@@ -41,7 +41,7 @@ pub(crate) fn survey<B: Bodies + ?Sized>(
 }
 
 /// Surveys `count` bodies and writes their velocity and pose records, velocities with the inertia
-/// where the bitstream wants it, and poses if there is a place for them; the sums of both, modulo 2^32,
+/// where the bitstream wants it, and poses; the sums of both, modulo 2^32,
 /// and whether validation accepts all bodies.
 ///
 /// Shape: each channel is as long as
@@ -51,10 +51,10 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     bodies: &B,
     count: usize,
     into: Survey<'_>,
-    (velocities, poses): (&mut [&mut [Beat]], Option<&mut [&mut [Beat]]>),
+    (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
     packers: &mut PackPool,
 ) -> (u32, u32, bool) {
-    let wanted = Wanted { into, velocities: Some(whole(velocities)), poses: poses.map(whole) };
+    let wanted = Wanted { into, velocities: Some(whole(velocities)), poses: Some(whole(poses)) };
     pack(target, bodies, count, wanted, packers)
 }
 

@@ -269,7 +269,7 @@ fn packed_bodies(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> [Vec<Vec<Beat>
     let poses = packed(spec, Segment::Poses, count, |poses| {
         let mut of_poses = 0;
         velocities = packed(spec, Segment::Velocities, count, |views| {
-            let places = (views, Some(poses));
+            let places = (views, poses);
             let (sum, other, _) = pack_bodies(target(spec), bodies, count, into, places, packers);
             of_poses = other;
             sum

@@ -138,7 +138,7 @@ impl Input {
         let [mut velocities, mut poses] =
             [Segment::Velocities, Segment::Poses].map(|it| self.buffers(it, bodies.len()));
         let into = Survey { ends: first, statics: first_statics };
-        let into_channels = (&mut *views(&mut velocities), Some(&mut *views(&mut poses)));
+        let into_channels = (&mut *views(&mut velocities), &mut *views(&mut poses));
         let (of_velocities, of_poses, of_bodies) =
             pack_bodies(target, bodies, bodies.len(), into, into_channels, packers);
         let into = Survey { ends: second, statics: second_statics };

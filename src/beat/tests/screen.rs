@@ -131,7 +131,7 @@ fn said_and_doubted(
         bodies,
         count,
         Survey { ends: &mut ends, statics: &mut statics },
-        (&mut views(&mut velocities), Some(&mut views(&mut poses))),
+        (&mut views(&mut velocities), &mut views(&mut poses)),
         &mut PackPool::alone(),
     );
     let moves =

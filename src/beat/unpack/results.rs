@@ -4,7 +4,7 @@
 //! numbers are made on the way. Whole units come first ([`stripe_reader`]). The rest at a segment's
 //! end, and a stripe that no profile has, come beat by beat.
 
-use pgs_interface::record::{Beat, result, velocity_result};
+use pgs_interface::record::{Beat, result};
 
 use super::stripe_reader::{self, Tally};
 use crate::beat::format::{Format, in_format};
@@ -53,8 +53,6 @@ pub(crate) struct Reader<'a> {
     /// The beats that are not read yet.
     channels: PieceRead<'a>,
     format: Option<Sixteen>,
-    /// Rows of a record: a whole result's, or of its velocity alone.
-    rows: usize,
     /// The pattern of the stripe, if a profile has it, and its first channel.
     pattern: Option<(Pattern, usize)>,
     deal: Deal,
@@ -69,7 +67,6 @@ impl<'a> Reader<'a> {
         Self {
             channels: whole_read(channels),
             format: Sixteen::of(layout.format),
-            rows: layout.rows,
             pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),
             sum: Lanes::all(0),
@@ -82,27 +79,23 @@ impl<'a> Reader<'a> {
     }
 
     #[inline(always)]
-    fn read_as<V: Vectors, F: Format, const ROWS: usize>(
-        &mut self,
-        vectors: V,
-        records: &mut [Record],
-    ) -> bool {
+    fn read_as<V: Vectors, F: Format>(&mut self, vectors: V, records: &mut [Record]) -> bool {
         let mut tally = Tally { sum: self.sum, finite: Finite::new() };
         let done = match self.pattern {
             Some((pattern, first)) if self.deal.at_end_of_group() => {
                 let rest = self.channels.get_mut(first..).unwrap_or_default();
-                stripe_reader::read::<V, F, ROWS>(pattern, vectors, rest, records, &mut tally)
+                stripe_reader::read::<V, F>(pattern, vectors, rest, records, &mut tally)
             }
             _ => 0,
         };
         // The units did not take these records.
         for record in records.iter_mut().skip(done) {
             let mut beats = [Beat::default(); result::ROWS];
-            let beats = &mut beats[..ROWS / F::PER_BEAT];
+            let beats = &mut beats[..result::ROWS / F::PER_BEAT];
             for beat in &mut *beats {
                 *beat = self.take();
             }
-            *record = tally.record::<V, F, ROWS>(vectors, beats);
+            *record = tally.record::<V, F>(vectors, beats);
         }
         self.sum = tally.sum;
         tally.finite.all()
@@ -135,12 +128,7 @@ impl Work for Reading<'_, '_> {
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> bool {
         let Self { reader, records } = self;
-        in_format!(reader.format, F => match reader.rows {
-            velocity_result::ROWS => {
-                reader.read_as::<V, F, { velocity_result::ROWS }>(vectors, records)
-            }
-            _ => reader.read_as::<V, F, { result::ROWS }>(vectors, records),
-        })
+        in_format!(reader.format, F => reader.read_as::<V, F>(vectors, records))
     }
 }
 

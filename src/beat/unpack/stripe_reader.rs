@@ -22,28 +22,22 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Decodes the record of these beats, and counts it. A record of fewer rows than a result has the
-    /// last rows of one; the rows before them are 0.
+    /// Decodes the record of these beats, and counts it.
     #[inline(always)]
-    pub(crate) fn record<V: Vectors, F: Format, const ROWS: usize>(
-        &mut self,
-        vectors: V,
-        beats: &[Beat],
-    ) -> Record {
+    pub(crate) fn record<V: Vectors, F: Format>(&mut self, vectors: V, beats: &[Beat]) -> Record {
         for beat in beats {
             self.sum = self.sum.plus((*beat).into());
         }
-        let mut rows = [Lanes::all(0); result::ROWS];
-        rows[const { result::ROWS - ROWS }..].copy_from_slice(&F::wide::<V, ROWS>(vectors, beats));
+        let rows = F::wide::<V, { result::ROWS }>(vectors, beats);
         self.finite.see(&rows);
         rows.map(Beat::from)
     }
 }
 
-/// Reads the records of `ROWS` rows that fill whole units, and returns their number. `rest` is the unread part of
+/// Reads the records that fill whole units, and returns their number. `rest` is the unread part of
 /// the channels, from the first channel of the stripe on.
 #[inline(always)]
-pub(crate) fn read<V: Vectors, F: Format, const ROWS: usize>(
+pub(crate) fn read<V: Vectors, F: Format>(
     pattern: Pattern,
     vectors: V,
     rest: &mut [&[Beat]],
@@ -52,14 +46,14 @@ pub(crate) fn read<V: Vectors, F: Format, const ROWS: usize>(
 ) -> usize {
     macro_rules! unit {
         ($places:ident: $records:literal are $beats:literal: $($channel:ident $share:literal),*) => {
-            if $records * ROWS == $beats * F::PER_BEAT {
+            if $records * result::ROWS == $beats * F::PER_BEAT {
                 let units = records.split_arrays_mut::<$records>().0;
                 let count = units.len();
                 let mut rest = rest.iter_mut();
                 $(let Some($channel) = part::<$share>(rest.next(), count) else { return 0 };)*
                 const CHANNELS: usize = [$($share),*].len();
                 for at in 0..count {
-                    units[at] = read_unit::<pattern::$places, V, F, ROWS, $records, $beats, CHANNELS>(
+                    units[at] = read_unit::<pattern::$places, V, F, $records, $beats, CHANNELS>(
                         vectors, [$(&$channel[at]),*], tally,
                     );
                 }
@@ -89,7 +83,6 @@ fn read_unit<
     P: Places<BEATS>,
     V: Vectors,
     F: Format,
-    const ROWS: usize,
     const RECORDS: usize,
     const BEATS: usize,
     const CHANNELS: usize,
@@ -104,7 +97,7 @@ fn read_unit<
     }
     let mut records = [Record::default(); RECORDS];
     for (record, beats) in records.iter_mut().zip(beats.chunks_exact(BEATS / RECORDS)) {
-        *record = tally.record::<V, F, ROWS>(vectors, beats);
+        *record = tally.record::<V, F>(vectors, beats);
     }
     records
 }
@@ -112,7 +105,6 @@ fn read_unit<
 #[cfg(test)]
 mod tests {
     use pgs_interface::profile::PROFILES;
-    use pgs_interface::record::velocity_result;
 
     use super::*;
     use crate::beat::format::in_format;
@@ -136,10 +128,7 @@ mod tests {
             let records = &mut [Record::default(); BLOCK];
             let tally = &mut Tally { sum: Lanes::all(0), finite: Finite::new() };
             in_format!(Sixteen::of(layout.format), F => {
-                match layout.rows {
-                    result::ROWS => read::<V, F, { result::ROWS }>(pattern, vectors, rest, records, tally),
-                    _ => read::<V, F, { velocity_result::ROWS }>(pattern, vectors, rest, records, tally),
-                }
+                read::<V, F>(pattern, vectors, rest, records, tally)
             })
         }
     }
@@ -148,10 +137,8 @@ mod tests {
     #[test]
     fn all_results_of_the_profiles_are_read_by_units() {
         for profile in PROFILES {
-            for segment in [Segment::Results, Segment::VelocityResults] {
-                let layout = segment.layout(&profile.default_variant());
-                assert_eq!(in_wide_vectors(Read(layout)), BLOCK, "{} {segment:?}", profile.name);
-            }
+            let layout = Segment::Results.layout(&profile.default_variant());
+            assert_eq!(in_wide_vectors(Read(layout)), BLOCK, "{}", profile.name);
         }
     }
 }

@@ -112,7 +112,7 @@ void ZynqPgsSolver::setParameters(const btContactSolverInfo &info, zpgs_paramete
     parameters.spin_damping = 0.0f;
     parameters.order = m_options.order;
     parameters.retries = m_options.retries;
-    // Not every bitstream has the next two, so a step asks for them only where it needs them.
+    // Not every bitstream has the friction of a pair, so a step asks for it only where it needs it.
     parameters.kinematic = m_gather.hasKinematic();
     const std::vector<float> &frictions = m_gather.frictions();
     parameters.friction = frictions[0];

@@ -7,7 +7,7 @@ use pgs_interface::control::{
 };
 use pgs_interface::profile::Inertia;
 use pgs_interface::register::Access;
-use rtlgen::verify::random::SplitMix64;
+use pgs_support::random::SplitMix64;
 
 use crate::outcome::{self, Feed};
 use crate::packets::packets;
@@ -32,15 +32,16 @@ pub fn run(
     let case = case(seed, inertia);
     let beats = packets(&case.scene, case.fault);
     outcome::reset(both)?;
-    for _ in 0..random.below(AT_REST) {
+    for _ in 0..random.word_below(AT_REST) {
         access(both, &mut random, false)?;
     }
     outcome::set_up(both, &case.scene)?;
-    both.write(GIE.offset, random.below(2))?;
-    both.write(IER.offset, random.below(8))?;
+    both.write(GIE.offset, random.word_below(2))?;
+    both.write(IER.offset, random.word_below(8))?;
     both.write(AP_CTRL.offset, ap_ctrl::START.mask())?;
     let mut feed = Feed::new(&beats);
-    let reset_at = if random.below(4) == 0 { u64::from(random.below(4000)) } else { u64::MAX };
+    let reset_at =
+        if random.word_below(4) == 0 { u64::from(random.word_below(4000)) } else { u64::MAX };
     while feed.busy && feed.clocks < CLOCKS_MAX {
         if feed.clocks >= reset_at {
             // The beats of the interrupted step are gone; a whole step follows.
@@ -48,7 +49,7 @@ pub fn run(
             break;
         }
         // With its interrupt the hardware may have ended the step, and the model not yet.
-        if random.below(8) == 0 && !feed.interrupt {
+        if random.word_below(8) == 0 && !feed.interrupt {
             access(both, &mut random, true)?;
         }
         feed.exchange(both)?;
@@ -60,7 +61,7 @@ pub fn run(
     for register in REGISTERS {
         both.read(register.offset)?;
     }
-    for _ in 0..random.below(AT_REST) {
+    for _ in 0..random.word_below(AT_REST) {
         access(both, &mut random, false)?;
     }
     for register in REGISTERS {
@@ -75,19 +76,21 @@ fn access(
     random: &mut SplitMix64,
     busy: bool,
 ) -> Result<(), ExternalError> {
-    let any = &REGISTERS[random.below(u32::try_from(REGISTERS.len()).unwrap_or(1)) as usize];
-    let shape = SHAPE_TABLE + SHAPE_STRIDE * random.below(64) + 4 * random.below(2);
-    match random.below(6) {
+    let any = &REGISTERS[random.word_below(u32::try_from(REGISTERS.len()).unwrap_or(1)) as usize];
+    let shape = SHAPE_TABLE + SHAPE_STRIDE * random.word_below(64) + 4 * random.word_below(2);
+    match random.word_below(6) {
         0 | 1 => both.read(any.offset).map(drop),
         2 => both.read(shape).map(drop),
-        3 => both.write([GIE, IER, ISR][random.below(3) as usize].offset, random.below(8)),
+        3 => {
+            both.write([GIE, IER, ISR][random.word_below(3) as usize].offset, random.word_below(8))
+        }
         // A step in progress keeps its shapes and its arguments.
-        4 if !busy => both.write(shape, random.bits()),
+        4 if !busy => both.write(shape, random.word()),
         4 => both.write(AP_CTRL.offset, ap_ctrl::START.mask()),
         _ if any.offset == AP_CTRL.offset || any.offset == RESET.offset => {
-            both.write(RESET.offset, random.bits() & !reset::RESET.mask())
+            both.write(RESET.offset, random.word() & !reset::RESET.mask())
         }
         _ if any.access == Access::SelfClearing => Ok(()),
-        _ => both.write(any.offset, random.bits()),
+        _ => both.write(any.offset, random.word()),
     }
 }

@@ -98,9 +98,8 @@ impl BuildArgs {
         };
         let inertia = self.inertia.into();
         let subnormals = Subnormals::Flush;
-        let parameters = Parameters::with(inertia);
-        let (extensions, fence) = (parameters.extensions(), Some(parameters.memory));
-        BoardConfig { hazards, inertia, subnormals, extensions, fence, ..Default::default() }
+        let fence = Some(Parameters::with(inertia).memory);
+        BoardConfig { hazards, inertia, subnormals, fence, ..Default::default() }
     }
 }
 

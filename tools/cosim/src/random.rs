@@ -4,7 +4,7 @@ use pgs_interface::profile::Inertia;
 use pgs_interface::profile::solver::SPIN_DAMPING;
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_interface::record::collision::{FRICTION_BITS, FRICTION_SHIFT};
-use rtlgen::verify::random::SplitMix64;
+use pgs_support::random::SplitMix64;
 
 use crate::packets::{Fault, FaultAt, STREAMS};
 use crate::scene::{Arguments, Body, Collision, Scene, Shape};
@@ -27,7 +27,7 @@ struct Draw(SplitMix64);
 impl Draw {
     /// A number below `limit`.
     fn below(&mut self, limit: u32) -> u32 {
-        self.0.below(limit)
+        self.0.word_below(limit)
     }
 
     /// True once in `n` times.
@@ -37,7 +37,7 @@ impl Draw {
 
     /// A number from -`size` to `size`.
     fn number(&mut self, size: f32) -> f32 {
-        let unit = f64::from(self.0.bits()) / f64::from(u32::MAX);
+        let unit = f64::from(self.0.word()) / f64::from(u32::MAX);
         #[expect(clippy::cast_possible_truncation, reason = "any f32 will do")]
         let number = ((2.0 * unit - 1.0) * f64::from(size)) as f32;
         number
@@ -110,7 +110,7 @@ impl Draw {
             let used = slot < count as usize;
             let [x, y, z] = self.vector(5.0);
             *point = match (used, self.one_in(2)) {
-                (false, true) => [NAN, self.0.bits(), NAN | NEGATIVE_ZERO, self.0.bits()],
+                (false, true) => [NAN, self.0.word(), NAN | NEGATIVE_ZERO, self.0.word()],
                 _ => [x, y, z, self.number(0.05).to_bits()],
             };
         }
@@ -182,7 +182,7 @@ impl Draw {
             };
             // The shape means nothing then.
             if scene.arguments.streamed_masses && self.one_in(2) {
-                body.shape = self.0.bits();
+                body.shape = self.0.word();
             }
         }
     }

@@ -109,7 +109,6 @@ fn the_driver_steps_on_an_accelerator_in_another_process() {
     let files = tempfile::tempdir().expect("a folder");
     let path = program(files.path(), "");
     for both in [false, true] {
-        // The model beside it has the extensions of the simulator.
         let mut config = config();
         let mut accelerator: Box<dyn ExternalAccelerator> =
             Box::new(SimulatorProcess::start_for(&mut config, &path).expect("a simulator"));

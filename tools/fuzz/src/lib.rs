@@ -13,7 +13,6 @@
 
 pub mod boards;
 pub mod campaign;
-pub mod finding;
 pub mod input;
 pub mod random;
 pub mod tally;

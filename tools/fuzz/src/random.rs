@@ -1,18 +1,7 @@
 //! Makes the bytes of an execution: a function of seed, target and number alone, so that any
 //! execution can be repeated alone, independently of the number of threads.
 
-/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
-#[derive(Debug)]
-struct SplitMix64(u64);
-
-impl SplitMix64 {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-}
+use pgs_support::random::SplitMix64;
 
 /// Fills `bytes` with at most `longest` bytes for execution `number` of the target `target`.
 ///
@@ -22,8 +11,9 @@ pub fn fill(bytes: &mut Vec<u8>, seed: u64, target: &str, number: u64, longest: 
     let name = target.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
     });
-    let mut mix = SplitMix64(seed);
-    let mut random = SplitMix64(mix.next() ^ name ^ number.wrapping_mul(0xD134_2543_DE82_EF95));
+    let mut mix = SplitMix64::new(seed);
+    let mut random =
+        SplitMix64::new(mix.next() ^ name ^ number.wrapping_mul(0xD134_2543_DE82_EF95));
     let shape = random.next();
     let length = (shape >> 8) % (longest as u64 + 1);
     bytes.clear();

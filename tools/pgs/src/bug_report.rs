@@ -95,7 +95,6 @@ fn parameters_json(parameters: &StepParameters) -> Value {
         "spin_damping": parameters.spin_damping,
         "kinematic": parameters.kinematic,
         "pair_friction": parameters.pair_friction,
-        "shape_friction": parameters.shape_friction,
         "warm_start": parameters.warm_start,
         "impulses_out": parameters.impulses_out,
         "gravity_m_s2": parameters.gravity,

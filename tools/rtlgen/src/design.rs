@@ -1,11 +1,10 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
-use pgs_interface::extension::Extensions;
 use pgs_interface::fence::Fence;
 use pgs_interface::profile::{Depth, FLOAT, Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
-use crate::equations::{self, WarmStart};
+use crate::equations;
 use crate::graph::Graph;
 use crate::schedule::Schedule;
 
@@ -27,11 +26,8 @@ pub struct Parameters {
     /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
     /// specification.
     pub smallest_normal: bool,
-    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bits 4 and 9.
+    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bit 1.
     pub inertia: Inertia,
-    /// Whether impulses come in (warm start) and go out: FEATURES bit 8. Without it, bits 3 and 4 of FLAGS
-    /// have no effect.
-    pub warm_start: WarmStart,
     /// The one address segment of every DMA master in the block design, which `FENCE_BASE` and
     /// `FENCE_SIZE` report.
     pub memory: Fence,
@@ -61,7 +57,6 @@ impl Parameters {
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
-            warm_start: WarmStart::Built,
             memory: Fence::default(),
             clock_khz: FLOAT.clock_khz,
         }
@@ -100,15 +95,6 @@ impl Parameters {
         }
         let Self { address_stages, output_stages, .. } = *self;
         Err(OddReadLatency { address_stages, output_stages, latency })
-    }
-
-    /// The extensions of the interface that the build has.
-    #[must_use]
-    pub fn extensions(&self) -> Extensions {
-        let possible = Extensions::possible(&self.variant());
-        let warm_start = self.warm_start == WarmStart::Built;
-        // The Verilog always takes poses in.
-        Extensions { warm_start, velocities_only: false, ..possible }
     }
 
     /// Cycles from an address to the velocity or the impulses.
@@ -163,8 +149,8 @@ impl Design {
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let interval = FLOAT.initiation_interval;
-        let contact = equations::contact(CONTACT_POINTS, parameters.inertia, parameters.warm_start);
-        let friction = equations::friction(parameters.inertia, parameters.warm_start);
+        let contact = equations::contact(CONTACT_POINTS, parameters.inertia);
+        let friction = equations::friction(parameters.inertia);
         Self {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
@@ -275,21 +261,6 @@ mod tests {
         for (isotropic, world) in isotropic.into_iter().zip(world) {
             assert_eq!((world.window, world.fill), (isotropic.window, isotropic.fill + 14));
         }
-    }
-
-    /// A build with a warm start has the same fill and the same window as one without.
-    #[test]
-    fn a_warm_start_makes_no_pass_longer() {
-        let without = Parameters { warm_start: WarmStart::LeftOut, ..Parameters::default() };
-        let [with, without] = [Parameters::default(), without].map(Design::new);
-        assert_eq!(with.depth(&with.contact), without.depth(&without.contact));
-        assert_eq!(with.depth(&with.friction), without.depth(&without.friction));
-        let units = |design: &Design| {
-            let units =
-                design.pipelines().into_iter().flat_map(|pipeline| &pipeline.schedule.units);
-            units.filter(|unit| unit.operation.operator().arithmetic).count()
-        };
-        assert_eq!(units(&with), units(&without));
     }
 
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.

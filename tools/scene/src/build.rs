@@ -213,14 +213,6 @@ impl Scene {
     pub fn set_frictions(&mut self, frictions: &[f32]) {
         self.frictions = frictions.to_vec();
     }
-
-    /// Gives each shape the root of its friction, so that the product of two is their geometric
-    /// mean. For boards that take frictions from the table of shapes.
-    pub fn set_shape_frictions(&mut self, frictions: &[f32]) {
-        for (shape, friction) in self.shapes.iter_mut().zip(frictions) {
-            *shape = shape.with_friction(standard(|| friction.sqrt()));
-        }
-    }
 }
 
 /// Refuses a drop that no scene can start from.

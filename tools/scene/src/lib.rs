@@ -36,7 +36,6 @@ mod grid;
 mod hull;
 mod measure;
 mod poses;
-mod random;
 mod rotation;
 mod shapes;
 mod spheres;
@@ -53,7 +52,7 @@ pub use measure::{
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };
-pub use random::SplitMix64;
+pub use pgs_support::random::SplitMix64;
 pub use shapes::{SHAPE_FRICTIONS, ShapesOptions};
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
 

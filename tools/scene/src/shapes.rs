@@ -4,8 +4,8 @@ use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Shape};
 
 use crate::build::{at_rest, check_drop};
-use crate::random::SplitMix64;
 use crate::{Geometry, Grid, Scene, SceneError, hull};
+use pgs_support::random::SplitMix64;
 
 /// The corners of the hulls.
 const HULL: [[f32; 3]; 12] = hull::cuboctahedron([0.9, 0.5, 0.6]);

@@ -11,8 +11,8 @@ use pgs_support::float_env::standard;
 use zynq_pgs::{Body, Collision, Contact, Shape};
 
 use crate::build::at_rest;
-use crate::random::SplitMix64;
 use crate::{GROUND, GROUND_HALF_EXTENT, MARGIN, SceneError};
+use pgs_support::random::SplitMix64;
 
 /// Radii, m; every third sphere has the same one.
 pub const RADII: [f32; 3] = [0.5, 0.8, 1.2];

@@ -67,7 +67,6 @@ pub(crate) fn stage(stage: Stage) -> String {
         Stage::Contact(pass) => format!("contact {pass}"),
         Stage::Friction(pass) => format!("friction {pass}"),
         Stage::Integrate => "integrate".to_owned(),
-        Stage::SendVelocities => "send".to_owned(),
     }
 }
 

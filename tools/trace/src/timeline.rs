@@ -65,7 +65,6 @@ fn stage_class(stage: Stage) -> &'static str {
         Stage::Contact(_) => "con",
         Stage::Friction(_) => "fri",
         Stage::Integrate => "pos",
-        Stage::SendVelocities => "res",
     }
 }
 

@@ -145,6 +145,34 @@ const SIX: u32 = 6;
 const FOUR: u32 = 4;
 
 impl Variant {
+    /// Whether each collision can have a friction of its own: in f32 a record has room for it above the
+    /// number of its contact points.
+    #[must_use]
+    pub const fn has_pair_friction(&self) -> bool {
+        matches!(self.numbers.collisions, StreamFormat::F32)
+    }
+
+    /// Whether bodies of inverse mass 0 can move: one at rest needs a zero.
+    #[must_use]
+    pub const fn has_kinematic(&self) -> bool {
+        self.numbers.bodies.has_zero_and_infinity()
+    }
+
+    /// Whether impulses can come in and go out: a collision without any needs a zero, and their row
+    /// a stream.
+    #[must_use]
+    pub const fn has_impulses(&self) -> bool {
+        self.profile.stripes.warm_collisions.is_some()
+            && self.numbers.collisions.has_zero_and_infinity()
+    }
+
+    /// Whether velocity records can bring the inverse mass of their body: the rows of a world inertia in
+    /// f32 have room for it.
+    #[must_use]
+    pub const fn has_streamed_masses(&self) -> bool {
+        matches!((self.inertia, self.numbers.bodies), (Inertia::World, StreamFormat::F32))
+    }
+
     /// Contact pipeline.
     #[must_use]
     pub const fn contact(&self) -> Depth {

@@ -8,9 +8,7 @@ use crate::accelerator::arithmetic::sixteen;
 use crate::accelerator::integrate::Pose;
 use crate::accelerator::solver::Velocity;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::record::{
-    Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity, velocity_result,
-};
+use pgs_interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity};
 
 /// The number in a word of a format.
 #[inline(always)]
@@ -155,17 +153,5 @@ pub(crate) fn result(
     rows[result::ORIENTATION] = row([x, y, z], word(w));
     rows[result::LINEAR] = row(velocity.linear, 0);
     rows[result::ANGULAR] = row(velocity.angular, 0);
-    rows
-}
-
-/// The result record of a step without poses.
-pub(crate) fn velocity_result(
-    format: StreamFormat,
-    velocity: &Velocity,
-) -> [Row; velocity_result::ROWS] {
-    let row = |[x, y, z]: [f32; 3]| [word(format, x), word(format, y), word(format, z), 0];
-    let mut rows = [[0; 4]; velocity_result::ROWS];
-    rows[velocity_result::LINEAR] = row(velocity.linear);
-    rows[velocity_result::ANGULAR] = row(velocity.angular);
     rows
 }

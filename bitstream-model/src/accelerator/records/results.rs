@@ -3,10 +3,10 @@
 use super::array::{Array, Row, beat_of};
 use super::striping::{PerStream, STREAMS_MAX};
 use crate::stream::Stream;
-use pgs_interface::record::{Beat, result, velocity_result};
+use pgs_interface::record::{Beat, result};
 
 /// A result fills whole beats, even with two rows in a beat.
-const _: () = assert!(result::ROWS.is_multiple_of(2) && velocity_result::ROWS.is_multiple_of(2));
+const _: () = assert!(result::ROWS.is_multiple_of(2));
 
 /// The results while they are being sent.
 #[derive(Debug, Clone, Copy)]
@@ -33,11 +33,6 @@ impl Results {
     pub(crate) fn room(&self, streams: &[Stream]) -> usize {
         let room = self.array.striping.contiguous(|k| self.sent[k] + streams[k].space());
         self.array.records_in(room) - self.done
-    }
-
-    /// Records that are still to be sent.
-    pub(crate) fn left(&self) -> usize {
-        self.array.records - self.done
     }
 
     /// Sends a record, for which there must be room; returns the sum of its words.

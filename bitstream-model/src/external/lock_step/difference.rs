@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::StreamBeat;
 use crate::config::BoardConfig;
 use pgs_interface::control::{REGISTERS, SHAPE_TABLE};
-use pgs_interface::record::{result, velocity_result};
+use pgs_interface::record::result;
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// The first difference between the hardware and the model.
@@ -145,8 +145,6 @@ fn first_word(model: &StreamBeat, hardware: &StreamBeat) -> Option<(usize, [u32;
 pub(super) struct Sent {
     /// Beats of impulses in front of the results, on their stream.
     pub(super) impulses: usize,
-    /// Whether the results are velocities alone.
-    pub(super) velocities_only: bool,
 }
 
 /// The first difference between the beats number `at` of a stream out.
@@ -170,10 +168,7 @@ pub(super) fn first_difference(
     let streams = config.profile.stripes.results.streams;
     let turn = streams.iter().position(|of| usize::from(*of) == stream).unwrap_or(0);
     let beat = result * streams.len() + turn;
-    // Velocities are the last rows of a whole result.
-    let first = if sent.velocities_only { result::ROWS - velocity_result::ROWS } else { 0 };
-    let rows = result::ROWS - first;
-    let (record, row) = (beat / rows, first + beat % rows);
+    let (record, row) = (beat / result::ROWS, beat % result::ROWS);
     if let Some((word, values)) = first_word(model, hardware) {
         return Some((DifferencePlace::Word { record, row, word }, values));
     }

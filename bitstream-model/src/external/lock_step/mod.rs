@@ -152,21 +152,17 @@ impl LockStep {
 
     /// The beats that a step with the model's arguments sends.
     fn sent_by_step(&mut self) -> Result<Sent, ExternalError> {
-        let can = self.config.built_extensions();
+        let has_impulses = self.config.variant().has_impulses();
         let mut read = |register: Register| self.model.read(register.offset);
         let set = read(FLAGS)?;
-        let velocities_only = can.velocities_only
-            && flags::VELOCITIES_ONLY.is_set(set)
-            && !flags::INTEGRATE.is_set(set);
-        let kinds = match can.warm_start && flags::IMPULSES_OUT.is_set(set) {
+        let kinds = match has_impulses && flags::IMPULSES_OUT.is_set(set) {
             true => {
                 let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];
                 kinds.iter().filter(|iterations| **iterations > 0).count()
             }
             false => 0,
         };
-        let impulses = kinds.saturating_mul(read(COLLISIONS)? as usize);
-        Ok(Sent { impulses, velocities_only })
+        Ok(Sent { impulses: kinds.saturating_mul(read(COLLISIONS)? as usize) })
     }
 
     /// Lets the model run on the beats that the hardware has taken.

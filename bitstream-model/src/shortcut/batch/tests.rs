@@ -37,12 +37,11 @@ const PARAMETERS: SolverParameters = SolverParameters {
     friction: 0.7,
     spin_damping: 0.1,
     pair_friction: false,
-    shape_friction: false,
 };
 
 const fn mass(inverse_mass: f32, inverse_inertia: f32) -> Mass {
     let inverse_inertia = [inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0];
-    Mass { inverse_mass, inverse_inertia, friction: 0.0 }
+    Mass { inverse_mass, inverse_inertia }
 }
 
 /// Static, three that move, a static one of a negative zero, one that moves although sixteen bits have

@@ -61,10 +61,9 @@ impl Deferred {
 impl Defer for Deferred {
     fn begin_step(&mut self, arguments: &Arguments, shapes: &[Shape]) -> bool {
         self.computed = 0;
-        // Designs whose impulses lie elsewhere go the long way, and so do frictions of shapes.
+        // Designs whose impulses lie elsewhere go the long way.
         let impulses = arguments.warm_start || arguments.impulses_out;
-        self.active = (!impulses || self.decoded.layout.warm_share.is_some())
-            && !arguments.solver.shape_friction;
+        self.active = !impulses || self.decoded.layout.warm_share.is_some();
         if self.active {
             self.decoded.begin_step(arguments, shapes);
         }

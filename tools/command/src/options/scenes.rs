@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
 use step_folder::npy;
+use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
-use zynq_pgs::{Capabilities, StepParameters};
 
 use crate::failure::Failure;
 use crate::numbers::grouped;
@@ -183,24 +183,17 @@ impl SceneArgs {
         check_size(self.grid(), capabilities)
     }
 
-    /// Gives the shapes their frictions, which a step takes from each collision or from the table of shapes.
+    /// Gives the shapes their frictions, which a step takes from each collision.
     ///
     /// # Errors
     ///
     /// Fails on cubes, which have one friction.
-    pub fn give_frictions(
-        &self,
-        scene: &mut Scene,
-        parameters: &StepParameters,
-    ) -> Result<(), Failure> {
+    pub fn give_frictions(&self, scene: &mut Scene) -> Result<(), Failure> {
         if self.is_cubes() {
             let error = "--pair-friction is for --scene shapes, the cubes have one friction";
             return Err(Failure::input(error));
         }
-        match parameters.shape_friction {
-            true => scene.set_shape_frictions(&SHAPE_FRICTIONS),
-            false => scene.set_frictions(&SHAPE_FRICTIONS),
-        }
+        scene.set_frictions(&SHAPE_FRICTIONS);
         Ok(())
     }
 

@@ -40,7 +40,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
         if number == 0 || input.one_in(4) {
             let most = if input.one_in(64) { 40 } else { 8 };
             scene = Scene::any(&mut input, most, most, InvalidValues::Sometimes);
-            scene.outgrow(&mut input, accelerator.capabilities().extensions);
+            scene.outgrow(&mut input, &accelerator.capabilities().variant);
             if accelerator.set_shapes(&scene.shapes).is_err() {
                 tally.refused += 1;
                 // Isotropic, which every board takes.
@@ -67,8 +67,8 @@ fn step(
     tally: &mut Tally,
 ) {
     let passes = if input.one_in(64) { 12 } else { 3 };
-    let extensions = accelerator.capabilities().extensions;
-    let parameters = parameters(input, passes, InvalidValues::Sometimes, extensions);
+    let variant = accelerator.capabilities().variant;
+    let parameters = parameters(input, passes, InvalidValues::Sometimes, &variant);
     scene.suit(input, &parameters, InvalidValues::Sometimes);
     let first = layout(input);
     let again = input.one_in(4).then(|| layout(input));

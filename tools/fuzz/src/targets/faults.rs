@@ -179,10 +179,10 @@ impl Run {
             // Such a step does not reach the board.
             return None;
         }
-        let extensions = accelerator.capabilities().extensions;
-        scene.outgrow(input, extensions);
+        let variant = accelerator.capabilities().variant;
+        scene.outgrow(input, &variant);
         accelerator.set_shapes(&scene.shapes).expect("every board takes isotropic shapes");
-        let mut parameters = parameters(input, 3, InvalidValues::Never, extensions);
+        let mut parameters = parameters(input, 3, InvalidValues::Never, &variant);
         scene.suit(input, &parameters, InvalidValues::Never);
         // With hazards, the result of a pipeline that does not wait depends on the arrival of
         // beats.

@@ -1,6 +1,6 @@
 //! Makes small scenes and parameters for the driver: mostly valid, sometimes invalid ones.
 
-use zynq_pgs::interface::extension::Extensions;
+use zynq_pgs::interface::profile::Variant;
 use zynq_pgs::order::{Order, Ties};
 use zynq_pgs::{
     Body, CONTACT_POINTS, Collision, Contact, Impulses, Pose, Shape, StepParameters, Velocity,
@@ -71,9 +71,9 @@ impl Scene {
         Self { shapes, bodies, collisions, impulses }
     }
 
-    /// Sometimes has more shapes than the table of a board that streams masses, and bodies of the last ones.
-    pub(super) fn outgrow(&mut self, input: &mut Input<'_>, extensions: Extensions) {
-        if !extensions.streamed_masses || !input.one_in(4) {
+    /// Sometimes has more shapes than the table of a board that can stream masses, and bodies of the last ones.
+    pub(super) fn outgrow(&mut self, input: &mut Input<'_>, variant: &Variant) {
+        if !variant.has_streamed_masses() || !input.one_in(4) {
             return;
         }
         let own = u32::try_from(self.shapes.len()).expect("a few");
@@ -203,13 +203,13 @@ fn collision(
     collision
 }
 
-/// Parameters; at most `passes` iterations of each solver. They ask for the extensions that the board
-/// has; where values may be invalid, also for others.
+/// Parameters; at most `passes` iterations of each solver. They ask for what the records of the
+/// board hold; where values may be invalid, also for the rest.
 pub(super) fn parameters(
     input: &mut Input<'_>,
     passes: u32,
     invalid: InvalidValues,
-    extensions: Extensions,
+    variant: &Variant,
 ) -> StepParameters {
     let mut parameters = StepParameters::default();
     parameters.time_step = input.pick(&[1.0 / 60.0, 1.0 / 240.0, 0.125]);
@@ -228,14 +228,12 @@ pub(super) fn parameters(
         parameters.spin_damping = input.pick(&[0.0, 0.5, 1.0]);
     }
     let all = invalid == InvalidValues::Sometimes && input.one_in(64);
-    let of = if all { Extensions::ALL } else { extensions };
     if switches & 96 == 96 {
         let wanted = input.byte();
-        parameters.kinematic = of.kinematic && wanted & 1 == 1;
-        parameters.pair_friction = of.pair_friction && wanted & 2 == 2;
-        parameters.warm_start = of.warm_start && wanted & 4 == 4;
-        parameters.impulses_out = of.warm_start && wanted & 8 == 8;
-        parameters.shape_friction = of.shape_friction && wanted & 16 == 16;
+        parameters.kinematic = (all || variant.has_kinematic()) && wanted & 1 == 1;
+        parameters.pair_friction = (all || variant.has_pair_friction()) && wanted & 2 == 2;
+        parameters.warm_start = (all || variant.has_impulses()) && wanted & 4 == 4;
+        parameters.impulses_out = (all || variant.has_impulses()) && wanted & 8 == 8;
     }
     if switches & 12 == 12 {
         parameters.order = Some(input.pick(&[

@@ -168,8 +168,8 @@ pub(super) fn answers(bytes: &[u8]) -> Tally {
         Accelerator::open(OpenOptions { board, ..OpenOptions::default() }).and_then(
             |mut accelerator| {
                 accelerator.set_shapes(&scene.shapes)?;
-                let extensions = accelerator.capabilities().extensions;
-                let parameters = parameters(&mut input, 3, InvalidValues::Never, extensions)
+                let variant = accelerator.capabilities().variant;
+                let parameters = parameters(&mut input, 3, InvalidValues::Never, &variant)
                     .with_deadline(Some(LONGEST_WAIT));
                 let mut bodies = scene.bodies.clone();
                 for _ in 0..2 {

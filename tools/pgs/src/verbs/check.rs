@@ -79,7 +79,7 @@ impl QuirkName {
         let mut quirks = Quirks::default();
         match self {
             Self::Identity => quirks.identification = 0xFFFF_0000,
-            Self::Version => quirks.version = 0x0002_0000,
+            Self::Version => quirks.version = 0x0003_0000,
             Self::Length14 => quirks.length_register = Some(14),
             Self::NoInterrupt => quirks.interrupt = InterruptWiring::Disconnected,
             Self::StuckInterrupt => quirks.interrupt = InterruptWiring::StuckHigh,

@@ -61,7 +61,7 @@ fn another_profile_than_the_generated_one_is_refused() {
 fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
     let folder = tempfile::tempdir().expect("a folder");
     let isotropic =
-        program(folder.path(), "#!/bin/sh\nprintf '1SGP\\002\\000\\000\\000'\ncat >/dev/null\n");
+        program(folder.path(), "#!/bin/sh\nprintf '1SGP\\001\\000\\000\\000'\ncat >/dev/null\n");
     let (code, stderr) = solve(&isotropic, &["--inertia", "world"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("built for isotropic inertia, and the board for world"), "{stderr}");
@@ -98,7 +98,7 @@ fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
     let folder = tempfile::tempdir().expect("a folder");
     // It answers the first four requests: the identification, the features of an interlocked accelerator,
     // and no fence.
-    let words = "1SGP\\002\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000";
+    let words = "1SGP\\001\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000";
     let four_requests = format!("printf '{words}'\nhead -c 48 >/dev/null\n");
     let ends = program(folder.path(), &format!("#!/bin/sh\n{four_requests}"));
     let mut command = serve(folder.path(), &ends, &[]);

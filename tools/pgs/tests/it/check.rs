@@ -46,7 +46,7 @@ fn without_a_guard_the_fence_is_not_proven() {
 fn every_quirk_ends_with_1_and_fails_its_own_line_alone() {
     for (quirk, line, cause) in [
         ("identity", "identification", "found 0xffff0000"),
-        ("version", "interface version", "found 2.0"),
+        ("version", "interface version", "found 3.0"),
         ("length14", "length register", "found 14 bits on all 8 channels"),
         ("no-interrupt", "interrupt", "found 0 of 3 steps"),
         ("stuck-interrupt", "interrupt", "nothing asks for one"),

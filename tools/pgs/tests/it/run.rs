@@ -142,19 +142,6 @@ fn shapes_have_a_friction_for_each_pair_and_cubes_have_one() {
     assert!(refused.stderr.contains("--scene shapes"), "{}", refused.stderr);
 }
 
-/// Records of `half` have no room for a friction.
-#[test]
-fn shapes_take_their_frictions_from_the_table_where_collisions_have_none() {
-    let shapes = "--scene shapes --profile half --grid 3x3x3 --steps 60";
-    let (one, own) = (document(&format!("{shapes} --pair-friction=false")), document(shapes));
-    assert_ne!(one["digest"], own["digest"]);
-    let config = &own["config"];
-    assert_eq!(
-        (&config["pair_friction"], &config["shape_friction"]),
-        (&false.into(), &true.into())
-    );
-}
-
 /// The shapes need no option: world inertia, a warm start and the frictions are the scene's.
 #[test]
 fn shapes_are_stepped_warm_beside_the_same_ones_cold() {

@@ -9,7 +9,6 @@ use pgs_interface::fence::Fence;
 use pgs_interface::profile::{Depth, FLOAT, Inertia, solver};
 
 use crate::design::Design;
-use crate::equations::WarmStart;
 use crate::operators;
 
 use super::text::{Text, line};
@@ -67,7 +66,6 @@ pub(super) fn schedule(design: &Design) -> String {
         number("DESIGN_INTERLOCKED", parameters.interlocked.into());
         number("DESIGN_SMALLEST_NORMAL", parameters.smallest_normal.into());
         number("DESIGN_WORLD_INERTIA", (parameters.inertia == Inertia::World).into());
-        number("DESIGN_WARM_START", (parameters.warm_start == WarmStart::Built).into());
         number("SHAPES", FLOAT.shape_capacity.into());
         number("MEMORY_ADDRESS_STAGES", parameters.address_stages.into());
         number("MEMORY_OUTPUT_STAGES", parameters.output_stages.into());
@@ -94,12 +92,9 @@ fn capabilities(text: &mut Text, design: &Design) {
     };
     let streams = |streams: &[u32]| u32::try_from(streams.len()).unwrap_or(0);
     let deep = |Depth { fill, window }| depth::WINDOW.put(depth::FILL.put(0, fill), window);
-    let features = features::CHECKSUMS.mask()
-        | features::IMPULSE_SUM.mask()
-        | features::FLUSH_SUBNORMALS.mask()
+    let features = features::FLUSH_SUBNORMALS.mask()
         | features::WORLD_INERTIA.put(0, (parameters.inertia == Inertia::World).into())
-        | features::INTERLOCKED.put(0, parameters.interlocked.into())
-        | parameters.extensions().features();
+        | features::INTERLOCKED.put(0, parameters.interlocked.into());
     let [fence_base, fence_size] = Fence::to_registers(Some(parameters.memory));
     let words = [
         ("IDENTIFICATION", control::IDENTIFICATION.reset),

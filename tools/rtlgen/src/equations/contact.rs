@@ -9,7 +9,6 @@
 use pgs_interface::profile::Inertia;
 
 use super::row::{self, Row};
-use super::warm::{Warm, WarmStart};
 use crate::graph::{Graph, Source};
 
 /// The graph of a contact pass over a collision of at most `points` contact points.
@@ -21,10 +20,10 @@ use crate::graph::{Graph, Source};
 /// with J. The impulse of an unused point means nothing, and its flag keeps it from every sum. Where
 /// impulses leave the chip, both are put out as 0.
 #[must_use]
-pub fn contact(points: usize, inertia: Inertia, warm_start: WarmStart) -> Graph {
+pub fn contact(points: usize, inertia: Inertia) -> Graph {
     let mut graph = Graph::default();
     let g = &mut graph;
-    let warm = Warm::new(g, warm_start);
+    let solves = g.input(Source::Switch, "solves");
     let normal = g.input3(Source::Record, "normal");
     let positions = row::SIDES.map(|side| g.input3(Source::Record, &format!("position_{side}")));
     let masses = row::masses(g, inertia);
@@ -53,11 +52,11 @@ pub fn contact(points: usize, inertia: Inertia, warm_start: WarmStart) -> Graph 
                 let speed = g.add(speed, bias);
                 let wanted = g.multiply(speed, row.jacobian);
                 let after = g.add(before, wanted);
-                warm.maximum(g, [after, zero], before)
+                g.maximum_or(solves, [after, zero], before)
             });
-            let change = g.within("impulse", |g| warm.change(g, after, before));
+            let change = g.within("impulse", |g| g.subtract(after, before.only_if(solves)));
             velocities = row.apply(g, change, acts, velocities, masses);
-            warm.output(g, &format!("impulse{i}"), after, acts);
+            row::output_impulse(g, &format!("impulse{i}"), after, acts);
             let counted = after.only_if(acts);
             sum = Some(match sum {
                 None => after,

@@ -19,7 +19,6 @@ use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 
 use super::row::{self, Row, Velocity};
-use super::warm::{Warm, WarmStart};
 use crate::graph::{Graph, Operand, Source, Vec3};
 
 /// The graph of a friction pass.
@@ -27,10 +26,10 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 /// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal impulse that the last contact pass stored, and
 /// `one_static` tells whether a body of the collision is static.
 #[must_use]
-pub fn friction(inertia: Inertia, warm_start: WarmStart) -> Graph {
+pub fn friction(inertia: Inertia) -> Graph {
     let mut graph = Graph::default();
     let g = &mut graph;
-    let warm = Warm::new(g, warm_start);
+    let solves = g.input(Source::Switch, "solves");
     let normal = g.input3(Source::Record, "normal");
     let positions = row::SIDES.map(|side| g.input3(Source::Record, &format!("position_{side}")));
     let masses = row::masses(g, inertia);
@@ -64,16 +63,16 @@ pub fn friction(inertia: Inertia, warm_start: WarmStart) -> Graph {
                 let wanted = g.multiply(speed, row.jacobian);
                 let after = g.add(before, wanted);
                 let after = g.maximum(after, limit.negated());
-                warm.minimum(g, [after, limit], before)
+                g.minimum_or(solves, [after, limit], before)
             });
-            let change = g.within("impulse", |g| warm.change(g, after, before));
-            warm.output(g, &format!("impulse{k}"), after, acts);
+            let change = g.within("impulse", |g| g.subtract(after, before.only_if(solves)));
+            row::output_impulse(g, &format!("impulse{k}"), after, acts);
             velocities = row.apply(g, change, acts, velocities, masses);
         });
     }
     let velocities = g.within("spin", |g| {
         let damped = spin_is_damped(g, one_static, positions, arms[0]);
-        let damped = warm.unless_warm(g, damped);
+        let damped = g.both(damped, solves);
         let share = g.input(Source::Argument, "spin_damping");
         velocities.map(|velocity| damp_spin(g, axis, velocity, damped, share))
     });

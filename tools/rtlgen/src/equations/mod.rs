@@ -9,9 +9,7 @@ mod contact;
 mod friction;
 mod integration;
 mod row;
-mod warm;
 
 pub use contact::contact;
 pub use friction::friction;
 pub use integration::integration;
-pub use warm::WarmStart;

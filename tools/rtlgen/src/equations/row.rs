@@ -73,6 +73,13 @@ pub(super) fn velocities(graph: &mut Graph) -> [Velocity; 2] {
     })
 }
 
+/// Puts an impulse out: 0 where a row does not act.
+pub(super) fn output_impulse(graph: &mut Graph, name: &str, impulse: Operand, acts: Operand) {
+    let zero = graph.constant(0.0);
+    let impulse = graph.select(acts, impulse, zero);
+    graph.output(name, &[impulse]);
+}
+
 /// The outputs of the velocities of both bodies.
 pub(super) fn output_velocities(graph: &mut Graph, velocities: [Velocity; 2]) {
     for (side, velocity) in SIDES.into_iter().zip(velocities) {

@@ -152,19 +152,15 @@ fn round_up(cycle: i32, interval: i32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::equations::{self, WarmStart};
+    use crate::equations;
     use pgs_interface::profile::Inertia;
 
     fn all() -> Vec<(Graph, u32)> {
-        let mut all = vec![
-            (equations::integration(), 1),
-            (equations::contact(4, Inertia::Isotropic, WarmStart::Built), 3),
-        ];
+        let mut all =
+            vec![(equations::integration(), 1), (equations::contact(4, Inertia::Isotropic), 3)];
         for inertia in [Inertia::Isotropic, Inertia::World] {
-            for warm_start in [WarmStart::Built, WarmStart::LeftOut] {
-                all.push((equations::contact(4, inertia, warm_start), 2));
-                all.push((equations::friction(inertia, warm_start), 2));
-            }
+            all.push((equations::contact(4, inertia), 2));
+            all.push((equations::friction(inertia), 2));
         }
         all
     }

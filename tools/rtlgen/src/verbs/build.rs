@@ -4,7 +4,6 @@ use clap::{Args, ValueEnum};
 use pgs_interface::fence::Fence;
 use pgs_interface::profile::Inertia;
 use rtlgen::design::{Design, OddReadLatency, Parameters};
-use rtlgen::equations::WarmStart;
 
 /// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,13 +30,6 @@ enum InertiaForm {
     Isotropic,
     /// Any, streamed with every body, with its mass.
     World,
-}
-
-/// An extension of the interface that a build need not have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Extension {
-    /// Impulses in and out.
-    WarmStart,
 }
 
 /// A build of the accelerator.
@@ -67,9 +59,6 @@ pub(crate) struct BuildArgs {
     /// Products and quotients that round up to the smallest normal number
     #[arg(long, value_enum, default_value_t = SmallestNormal::Exact)]
     smallest_normal: SmallestNormal,
-    /// An extension to leave out, for the cost of it
-    #[arg(long, value_enum, value_name = "EXTENSION")]
-    without: Vec<Extension>,
     /// The only memory that the DMA masters reach, as 0x40000000+512M: a power of two of at least 64K, at a
     /// multiple of it. The device tree must reserve the same
     #[arg(long, value_name = "BASE+BYTES", default_value_t = Fence::default())]
@@ -82,10 +71,6 @@ pub(crate) struct BuildArgs {
 impl BuildArgs {
     /// The design that the options describe.
     pub(crate) fn design(&self) -> Result<Design, OddReadLatency> {
-        let warm_start = match self.without.contains(&Extension::WarmStart) {
-            true => WarmStart::LeftOut,
-            false => WarmStart::Built,
-        };
         let inertia = match self.inertia {
             InertiaForm::Isotropic => Inertia::Isotropic,
             InertiaForm::World => Inertia::World,
@@ -99,7 +84,6 @@ impl BuildArgs {
             address_stages: self.address_stages,
             output_stages: self.output_stages,
             smallest_normal: self.smallest_normal == SmallestNormal::Exact,
-            warm_start,
             memory: self.memory,
             clock_khz: self.clock_khz,
         };

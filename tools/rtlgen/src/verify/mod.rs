@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::process::ExitStatus;
 
 pub mod operators;
-pub mod random;
 pub mod reference;
 pub mod simulation;
 pub mod sincos;

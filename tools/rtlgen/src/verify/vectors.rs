@@ -1,6 +1,6 @@
 //! Operands for the operators: random ones, and more of the rare cases than random bits have.
 
-use super::random::SplitMix64;
+use pgs_support::random::SplitMix64;
 
 /// The operands of one cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,19 +67,19 @@ impl Vectors {
     /// A pair of one of ten kinds.
     fn pair(&mut self) -> (u32, u32) {
         let random = &mut self.0;
-        let a = random.bits();
-        let b = random.bits();
+        let a = random.word();
+        let b = random.word();
         let exponent = (a >> 23) & 0xFF;
-        match random.below(10) {
+        match random.word_below(10) {
             // Any bits.
             0 => (a, b),
             // Near exponents: every distance that the adder aligns.
             1 | 2 => {
-                let near = (exponent + random.below(57)).saturating_sub(28);
+                let near = (exponent + random.word_below(57)).saturating_sub(28);
                 (a, Self::with_exponent(b, near))
             }
             // Cancellation: operands that differ in sign and in a few of the lowest bits.
-            3 => (a, a ^ SIGN ^ random.below(16)),
+            3 => (a, a ^ SIGN ^ random.word_below(16)),
             // Products about the smallest normal number, quotients about it in the other order.
             4 => {
                 let product = random.between(BIAS - 3, BIAS + 3);
@@ -87,7 +87,7 @@ impl Vectors {
             }
             5 => {
                 let difference = random.between(BIAS - 3, BIAS + 3);
-                let low = random.below(BIAS);
+                let low = random.word_below(BIAS);
                 (Self::with_exponent(a, low), Self::with_exponent(b, low + difference))
             }
             // Results about the largest number.
@@ -101,7 +101,7 @@ impl Vectors {
             // A result of ones just below a power of two, most of all the smallest normal number.
             8 => self.ones(a, b),
             // Special operands, with others and with each other.
-            _ => match random.below(3) {
+            _ => match random.word_below(3) {
                 0 => (random.pick(&SPECIALS), b),
                 1 => (a, random.pick(&SPECIALS)),
                 _ => (random.pick(&SPECIALS), random.pick(&SPECIALS)),
@@ -116,7 +116,7 @@ impl Vectors {
         let sum = random.between(BIAS - 1, BIAS + 1);
         let exponent = random.between(1, BIAS - 2);
         let other = sum - exponent;
-        match random.below(3) {
+        match random.word_below(3) {
             0 => {
                 let significand = u64::from(a & FRACTION | 0x0080_0000);
                 let partner = ((1_u64 << 47) - 1) / significand;
@@ -125,13 +125,13 @@ impl Vectors {
                 (Self::with_exponent(a, exponent), Self::with_exponent(b, other))
             }
             1 => {
-                let ones = (a & SIGN) | (FRACTION - random.below(2));
+                let ones = (a & SIGN) | (FRACTION - random.word_below(2));
                 (Self::with_exponent(ones, exponent), Self::with_exponent(b & SIGN, other))
             }
             // The same for a quotient.
             _ => {
-                let ones = (a & SIGN) | (FRACTION - random.below(2));
-                let divisor = (b & SIGN) | random.below(2);
+                let ones = (a & SIGN) | (FRACTION - random.word_below(2));
+                let divisor = (b & SIGN) | random.word_below(2);
                 (Self::with_exponent(ones, exponent), Self::with_exponent(divisor, exponent + sum))
             }
         }
@@ -139,8 +139,8 @@ impl Vectors {
 
     fn radicand(&mut self) -> u32 {
         let random = &mut self.0;
-        let bits = random.bits();
-        match random.below(8) {
+        let bits = random.word();
+        match random.word_below(8) {
             // Negative numbers have no root, but for -0.
             0 => bits,
             // Squares of 12 bits, and their neighbours.
@@ -150,7 +150,7 @@ impl Vectors {
                 let shift = square.leading_zeros().saturating_sub(8);
                 let fraction = (square << shift) & FRACTION;
                 let number = Self::with_exponent(fraction, random.between(1, 254));
-                number.wrapping_add(random.below(3)).wrapping_sub(1)
+                number.wrapping_add(random.word_below(3)).wrapping_sub(1)
             }
             2 => random.pick(&SPECIALS),
             _ => bits & !SIGN,
@@ -159,16 +159,16 @@ impl Vectors {
 
     fn argument(&mut self) -> u32 {
         let random = &mut self.0;
-        let sign = random.bits() & SIGN;
-        match random.below(16) {
+        let sign = random.word() & SIGN;
+        match random.word_below(16) {
             // Below 2^-12, zeros and subnormals among them, and the ends of the range.
-            0 => sign | random.below(*POLYNOMIAL.start()),
+            0 => sign | random.word_below(*POLYNOMIAL.start()),
             1 => {
                 let ends = [*POLYNOMIAL.start() - 1, *POLYNOMIAL.start(), *POLYNOMIAL.end(), 0];
                 sign | random.pick(&ends)
             }
             // Infinity and NaN.
-            2 => sign | 0x7F80_0000 | (random.bits() & random.pick(&[0, FRACTION])),
+            2 => sign | 0x7F80_0000 | (random.word() & random.pick(&[0, FRACTION])),
             _ => sign | random.between(*POLYNOMIAL.start(), *POLYNOMIAL.end()),
         }
     }

@@ -11,7 +11,6 @@ mod trial;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::profile::{PROFILES, Profile};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -83,12 +82,8 @@ pub(crate) fn run(
         None => PROFILES.to_vec(),
     };
     let (mut all, mut listed) = (Vec::new(), Vec::new());
-    let starts = |profile: &'static Profile| {
-        let warm = Extensions::possible(&profile.default_variant()).warm_start;
-        [Start::Cold, Start::Warm].into_iter().filter(move |start| warm || *start == Start::Cold)
-    };
-    let settings =
-        profiles.into_iter().flat_map(|profile| starts(profile).map(move |start| (profile, start)));
+    let starts = |profile| [Start::Cold, Start::Warm].map(|start| (profile, start));
+    let settings = profiles.into_iter().flat_map(starts);
     for (profile, start) in settings {
         let bench = Bench::new(profile, start)?;
         let (cells, impossible) = cells::of(&bench);

@@ -47,11 +47,8 @@ impl Cold {
         parameters: &StepParameters,
         arranger: Option<Arranger>,
     ) -> Self {
-        let parameters = parameters
-            .with_warm_start(false)
-            .with_impulses_out(false)
-            .with_pair_friction(false)
-            .with_shape_friction(false);
+        let parameters =
+            parameters.with_warm_start(false).with_impulses_out(false).with_pair_friction(false);
         Self { scene, parameters, arranger, last: None }
     }
 

@@ -94,7 +94,6 @@ pub(super) fn document(
     config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
-    config["shape_friction"] = parameters.shape_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();
     let steps = std::mem::take(&mut course.documents);
     let (done, complete) = (course.done, course.is_complete(args.steps()));

@@ -10,7 +10,6 @@ mod summary;
 
 use std::io::{self, Write};
 
-use bitstream_model::interface::extension::Extensions;
 use clap::Args;
 use scene::Scene;
 use serde_json::Value;
@@ -52,7 +51,7 @@ Examples:
   pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
-  pgs run --scene shapes --warm-start=false --pair-friction=false     without extensions of 1.2
+  pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
   pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
@@ -93,12 +92,11 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     solver: SolverArgs,
     /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
-    /// [default: on for --scene shapes, if the board has the extension]
+    /// [default: on for --scene shapes]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     warm_start: Option<bool>,
-    /// Give each pair of shapes a friction of its own, from both bodies' kinds: with the
-    /// collisions or, where these have no room for it, from the table of shapes [default: on for
-    /// --scene shapes, if the board has either extension]
+    /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on for
+    /// --scene shapes, if the collision records of the board have room for it]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
@@ -130,18 +128,15 @@ impl RunArgs {
     /// as it is.
     fn parameters(&self, can: &Capabilities) -> StepParameters {
         let shapes = !self.scene.is_cubes();
-        let warm = self.warm_start.unwrap_or(shapes && can.extensions.warm_start);
-        let Extensions { pair_friction, shape_friction, .. } = can.extensions;
-        let frictions = self.pair_friction.unwrap_or(shapes && (pair_friction || shape_friction));
-        // Where neither can be had, the refusal names the boards whose collisions have a friction.
-        let by_shape = shape_friction && !pair_friction;
+        let warm = self.warm_start.unwrap_or(shapes && can.variant.has_impulses());
+        let has_frictions = can.variant.has_pair_friction();
+        let frictions = self.pair_friction.unwrap_or(shapes && has_frictions);
         let parameters = StepParameters::default()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(warm)
             .with_impulses_out(warm)
-            .with_pair_friction(frictions && !by_shape)
-            .with_shape_friction(frictions && by_shape);
+            .with_pair_friction(frictions);
         let parameters = self.deadline.apply(self.solver.apply(parameters));
         self.faults.apply(self.ordering.apply(parameters))
     }
@@ -229,8 +224,8 @@ pub(crate) fn run(
     args.scene.check_size(opened.accelerator.capabilities())?;
     let parameters = args.parameters(opened.accelerator.capabilities());
     let mut scene = args.scene.build(&build)?;
-    if parameters.pair_friction || parameters.shape_friction {
-        args.scene.give_frictions(&mut scene, &parameters)?;
+    if parameters.pair_friction {
+        args.scene.give_frictions(&mut scene)?;
     }
     let tracing = args.tracing(&opened)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;

@@ -8,7 +8,7 @@ use super::super::MARGIN;
 use super::*;
 use crate::Geometry;
 use crate::fixtures::{LEVEL, bits, body as cube};
-use crate::random::SplitMix64;
+use pgs_support::random::SplitMix64;
 
 /// The collisions of pairs, each found anew.
 fn all(

@@ -1,9 +1,7 @@
-//! Generates random numbers, the same for a seed on every machine.
+//! Numbers from a seed, the same on every machine.
 
-/// A generator of random numbers.
-///
-/// Source: Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
-#[derive(Debug)]
+/// Steele, Lea and Flood: "Fast splittable pseudorandom number generators" (2014).
+#[derive(Debug, Clone)]
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
@@ -13,11 +11,18 @@ impl SplitMix64 {
         Self(seed)
     }
 
-    fn next(&mut self) -> u64 {
+    /// 64 bits.
+    #[expect(clippy::should_implement_trait, reason = "the sequence has no end")]
+    pub const fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         z ^ (z >> 31)
+    }
+
+    /// 32 bits.
+    pub const fn word(&mut self) -> u32 {
+        (self.next() >> 32) as u32
     }
 
     /// A number below `end`; 0 if `end` is 0.
@@ -26,15 +31,28 @@ impl SplitMix64 {
         usize::try_from((u128::from(self.next()) * end as u128) >> 64).unwrap_or(0)
     }
 
-    /// From 0 up to, and without, 1.
-    pub(crate) fn unit(&mut self) -> f32 {
-        // 24 bits are exact in an f32.
+    /// A word below `end`, which is not 0.
+    pub fn word_below(&mut self, end: u32) -> u32 {
+        ((u64::from(self.word()) * u64::from(end)) >> 32) as u32
+    }
+
+    /// A word between two, both of them included.
+    pub fn between(&mut self, low: u32, high: u32) -> u32 {
+        low + self.word_below(high - low + 1)
+    }
+
+    /// One of a list, which is not empty.
+    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.below(from.len())]
+    }
+
+    /// From 0 up to, and without, 1, in steps that are exact in f32.
+    pub fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / 16_777_216.0
     }
 
-    /// From -1 up to, and without, 1.
-    pub(crate) fn sign(&mut self) -> f32 {
-        // Exact, as above.
+    /// From -1 up to, and without, 1, in steps that are exact in f32.
+    pub fn sign(&mut self) -> f32 {
         (self.next() >> 40) as f32 / 8_388_608.0 - 1.0
     }
 }

@@ -1,13 +1,12 @@
-//! Compares the extensions of interface 1.2 with the direct solver, bit for bit, and holds a board of
-//! version 1.1 against a driver of 1.2.
+//! Compares what a step can ask for beside the plain solver with the direct solver, bit for bit: the
+//! spin damping, static bodies that move, frictions of pairs, streamed masses.
 #![cfg(feature = "emulation")]
 
 use crate::common::direct::direct_step;
 use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered, row};
-use bitstream_model::interface::extension::Extensions;
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE};
-use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
+use bitstream_model::{BoardConfig, Direction, Fault, FaultKind};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
 
@@ -234,65 +233,8 @@ fn one_board_takes_few_shapes_after_many_and_many_after_few() {
 }
 
 #[test]
-fn more_shapes_than_entries_need_the_extension() {
-    let isotropic = BoardConfig::default();
-    for config in [isotropic, old()] {
-        let (_board, mut accelerator) = open_with(config, None, &both_inertias()[1]);
-        let error = accelerator.set_shapes(&[Shape::isotropic(1.0, 6.0); 65]).expect_err("65");
-        assert!(error.is_input() && error.to_string().contains("takes at most 64"), "{error}");
-    }
-}
-
-/// A board of interface version 1.1.
-fn old() -> BoardConfig {
-    let mut config = BoardConfig { extensions: Extensions::NONE, ..BoardConfig::default() };
-    config.inertia = Inertia::World;
-    config.quirks.version = 0x0001_0001;
-    config
-}
-
-#[test]
-fn a_board_of_version_1_1_takes_the_steps_that_it_knows() {
-    let ((bodies, collisions), shapes) = (scene(3), shapes());
-    let parameters = ordered(Order::AsGiven);
-    let mut expected = bodies.clone();
-    direct_step(&mut expected, &collisions, &shapes, &parameters);
-    let (board, mut accelerator) = open_with(old(), None, &shapes);
-    assert_eq!(accelerator.capabilities().version, (1, 1));
-    let mut found = bodies;
-    accelerator.step(&mut found, &collisions, &parameters).expect("no extension is asked for");
-    assert_eq!(bits(&found), bits(&expected));
-    // A strict board dies of an access to a register that it lacks.
-    assert_eq!(board.violations(), []);
-}
-
-#[test]
-fn a_board_of_version_1_1_refuses_each_extension_by_name() {
-    let ((bodies, collisions), shapes) = (scene(3), shapes());
-    let (board, mut accelerator) = open_with(old(), None, &shapes);
-    let [mut no_spin, mut moving] = [StepParameters::default(); 2];
-    no_spin.spin_damping = 0.0;
-    moving.kinematic = true;
-    let mut own = StepParameters::default();
-    own.pair_friction = true;
-    let asked = [
-        (no_spin, "the spin damping is 0, and this bitstream"),
-        (moving, "the step asks for static bodies that move, which this bitstream"),
-        (own, "the step asks for a friction for each collision, which this bitstream"),
-    ];
-    for (parameters, begins) in asked {
-        let mut found = bodies.clone();
-        let error = accelerator.step(&mut found, &collisions, &parameters).expect_err("1.1");
-        assert!(error.is_input());
-        assert!(error.to_string().starts_with(begins), "{error}");
-        assert_eq!(bits(&found), bits(&bodies), "nothing has changed");
-    }
-    assert_eq!(board.violations(), []);
-}
-
-/// A driver of version 1.1 writes no argument of an extension.
-#[test]
-fn arguments_of_extensions_begin_at_the_values_of_version_1_1() {
-    let board = EmulatedBoard::new(BoardConfig::default()).expect("a board");
-    assert_eq!(board.cpu_port().read32(0xA004_0078), 0x3DCC_CCCD);
+fn more_shapes_than_entries_need_world_inertia() {
+    let (_board, mut accelerator) = open_with(BoardConfig::default(), None, &both_inertias()[1]);
+    let error = accelerator.set_shapes(&[Shape::isotropic(1.0, 6.0); 65]).expect_err("65");
+    assert!(error.is_input() && error.to_string().contains("takes at most 64"), "{error}");
 }
