@@ -15,7 +15,7 @@ pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
 pub use contact_memory::ContactMemory;
 pub use impulses::{Impulses, WarmCollisions};
-pub use order::{Order, Ties};
+pub use order::Order;
 pub use parameters::StepParameters;
 pub(crate) use passes::Passes;
 pub use shape::{Shape, ShapeError};

@@ -11,7 +11,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use super::OrderArgs;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
-use pgs_command::permutation;
+use crate::permutation;
 use pgs_command::pile;
 use pgs_command::step_input;
 use step_folder::folder::Folder;

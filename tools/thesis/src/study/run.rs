@@ -7,7 +7,7 @@ use super::start::Start;
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
-use pgs_command::permutation::{Arranger, Permutation};
+use crate::permutation::{Arranger, Permutation};
 use step_folder::folder::Folder;
 
 /// The bodies and collisions of a run.

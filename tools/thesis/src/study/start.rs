@@ -16,7 +16,7 @@ use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
-use pgs_command::permutation::{self, Permutation};
+use crate::permutation::{self, Permutation};
 use pgs_command::pile;
 use pgs_command::step_input;
 use scene::Scene;

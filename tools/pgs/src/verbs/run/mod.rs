@@ -48,7 +48,6 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
-  pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
@@ -176,8 +175,7 @@ impl RunArgs {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
         let wanted = beside::is_stepped(self.beside_cold, shown && !self.wide, has_sensors);
         let scene = || self.scene.build(&self.build.build());
-        let arranger = self.ordering.arranger(None);
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
     }
 }
 
@@ -296,15 +294,13 @@ fn take_steps(
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
-    let mut arranger = args.ordering.arranger(None);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
         let tracing = tracing.filter(|(_, step)| *step == number).map(|(tracing, _)| tracing);
         if let Some(tracing) = tracing {
             tracing.begin();
         }
-        let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
-        let row = step(number, parameters, &mut opened.accelerator, scene, memory, arranger);
+        let row = step(number, parameters, &mut opened.accelerator, scene, memory.as_mut());
         let traced = tracing.map(|tracing| {
             let row = row.as_ref().ok().and_then(Option::as_ref);
             tracing.end(row.map(|row| &row.report))
@@ -383,7 +379,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &order::with_reason(first, args.ordering.permutation()))?;
+    fact(out, "order", &order::with_reason(first))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,

@@ -1,13 +1,16 @@
 //! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
 
 use crate::estimate::thesis::BODIES;
-use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderError, Orderer, Ties, live_curve};
+use zynq_pgs::order::{
+    InputBuffers, IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule, live_curve,
+};
 
 use super::super::step::{DEPTH, Step};
 use crate::experiment::Part;
 use crate::figure::Figure;
 use crate::figure::{Axis, Drawn, Series, lines};
 use crate::index::{Origin, Row};
+use crate::permutation::body_by_body::{self, Ties};
 use crate::study::recorded::{MOST_ALIVE, MOST_ALIVE_PERCENT};
 use pgs_command::failure::Failure;
 use pgs_command::numbers::grouped;
@@ -43,15 +46,19 @@ pub(crate) fn part(step: &Step) -> Result<Part, Failure> {
     let mut orderer = Orderer::new();
     let mut series = Vec::new();
     let mut most = Vec::new();
-    for (name, order) in [
-        ("as given", Order::AsGiven),
-        ("Algorithm 3, ties by the lowest index", Order::BodyByBody(Ties::LowestIndex)),
-        ("Algorithm 3, ties by the oldest", Order::BodyByBody(Ties::Oldest)),
-        ("Algorithm 3, ties by the newest", Order::BodyByBody(Ties::Newest)),
-        ("hazard-free (ours)", Order::HazardFree),
+    let thesis = |input: &OrderInput<'_>, ties| -> Schedule {
+        body_by_body::order(input, ties).into_iter().map(Some).collect()
+    };
+    let mut ours = |order| orderer.order(&input, order, window).cloned().map_err(refused);
+    // The driver checks the input, before the thesis' orders are made of it.
+    for (name, schedule) in [
+        ("as given", ours(Order::AsGiven)?),
+        ("Algorithm 3, ties by the lowest index", thesis(&input, Ties::LowestIndex)),
+        ("Algorithm 3, ties by the oldest", thesis(&input, Ties::Oldest)),
+        ("Algorithm 3, ties by the newest", thesis(&input, Ties::Newest)),
+        ("hazard-free (ours)", ours(Order::HazardFree)?),
     ] {
-        orderer.order(&input, order, window).map_err(refused)?;
-        let alive = live_curve(orderer.schedule(), &input, window).map_err(refused)?;
+        let alive = live_curve(&schedule, &input, window).map_err(refused)?;
         most.push((name, alive.iter().copied().max().unwrap_or(0)));
         series.push(Series::new(name, Drawn::Line, thinned(&alive)));
     }

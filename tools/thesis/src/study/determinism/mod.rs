@@ -19,7 +19,7 @@ use pgs_command::board::OpenBoard;
 use pgs_command::failure::Failure;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::is_sequential;
-use pgs_command::permutation::Permutation;
+use crate::permutation::Permutation;
 
 const EXAMPLES: &str = "\
 Examples:
