@@ -122,7 +122,8 @@ fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
 #[test]
 fn the_accelerator_of_a_comparison_is_board_b() {
     let ran =
-        run("compare float float --grid 2x2x2 --steps 1 --accelerator rtl:/no/such".split(' '));
+        run("thesis compare float float --grid 2x2x2 --steps 1 --accelerator rtl:/no/such"
+            .split(' '));
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("board B (float)"), "{}", ran.stderr);
     assert!(ran.stderr.contains("the simulator /no/such cannot be started"), "{}", ran.stderr);

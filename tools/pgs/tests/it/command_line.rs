@@ -152,7 +152,7 @@ fn falling_back_to_the_emulated_board_is_said_without_a_warning() {
     assert_eq!(board["kind"], "emulated");
     assert!(board["reason"].as_str().is_some_and(|why| why.starts_with("there is no UIO node")));
     // The results of other verbs do not name the board.
-    let order = ran("order --grid 2x2x2 --steps 1");
+    let order = ran("thesis order --grid 2x2x2 --steps 1");
     assert!(order.stderr.starts_with("board: emulated (there is no UIO node"), "{}", order.stderr);
     assert_eq!(order.stderr.lines().count(), 1, "{}", order.stderr);
 }

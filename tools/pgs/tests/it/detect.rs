@@ -173,10 +173,9 @@ fn wrong_usage_is_refused() {
 fn a_grid_that_finds_no_memory_ends_in_a_sentence() {
     let command = pgs();
     let mut shell = Command::new("sh");
-    shell.args(["-c", "ulimit -v 500000; exec \"$0\" \"$@\""]);
+    shell.args(["-c", "ulimit -v 250000; exec \"$0\" \"$@\""]);
     shell.arg(command.get_program()).args(command.get_args());
-    let ran: Ran =
-        shell.args(["thesis", "formats", "--grid", "60x100x60"]).output().expect("a shell").into();
+    let ran: Ran = shell.args(["run", "--grid", "50x50x50"]).output().expect("a shell").into();
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
-    assert!(ran.stderr.contains("60x100x60 takes about 921600000 bytes"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("50x50x50 takes about 320000000 bytes"), "{}", ran.stderr);
 }

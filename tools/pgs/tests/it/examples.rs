@@ -42,7 +42,8 @@ fn helps() -> BTreeMap<Vec<String>, String> {
     let mut left = vec![Vec::new()];
     while let Some(verb) = left.pop() {
         let help = run(verb.iter().cloned().chain(["--help".to_owned()])).stdout;
-        let verbs = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+        let heads = ["Commands:", "Experiments:"];
+        let verbs = help.lines().skip_while(|line| !heads.contains(line)).skip(1);
         let names = verbs.take_while(|line| !line.is_empty()).filter_map(|line| {
             line.strip_prefix("  ").filter(|line| !line.starts_with(' '))?.split(' ').next()
         });

@@ -139,7 +139,9 @@ mod tests {
             let found = found.unwrap_or_else(|| panic!("no table {}", table["id"]));
             let cells = |row: &Value| {
                 let keys = list(&table["columns"]).into_iter();
-                Value::from(keys.map(|key| row[key.as_str().expect("a key")].clone()).collect::<Vec<_>>())
+                Value::from(
+                    keys.map(|key| row[key.as_str().expect("a key")].clone()).collect::<Vec<_>>(),
+                )
             };
             let rows: Vec<_> = list(&found["rows"]).iter().map(cells).collect();
             assert_eq!(rows, list(&table["rows"]), "{}", table["id"]);
