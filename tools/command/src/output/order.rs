@@ -9,10 +9,7 @@ use crate::options::ordering::{is_sequential, name};
 
 /// How the order of a step relates to Bullet's, in words; none if the order is Bullet's and the
 /// comparison fails all the same.
-pub fn beside_bullet(
-    report: &StepReport,
-    capabilities: &Capabilities,
-) -> Option<&'static str> {
+pub fn beside_bullet(report: &StepReport, capabilities: &Capabilities) -> Option<&'static str> {
     match report.order {
         Order::AsGiven if is_sequential(capabilities) => Some("Bullet's own, to compare with it"),
         Order::AsGiven => None,

@@ -44,7 +44,7 @@ change is a word: binary16, thesis16, thesis16-literal (numbers on 16-bit stream
 bandwidth=GBPS, arithmetic=f32|binary16, length-width=BITS, address-width=BITS, threads=N and
 lanes=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
 hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
-random=SEED (see `pgs solve --help`). Without an order, a board that waits on hazards takes the
+random=SEED (another one in each step). Without an order, a board that waits on hazards takes the
 collisions as given, so that two such boards solve them in the same order. Each board detects its
 own collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in
 model.

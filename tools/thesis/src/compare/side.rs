@@ -10,10 +10,10 @@ use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters,
 use super::spec::SideSpec;
 use crate::deviation::{moving, unmoved_share};
 use crate::narrow::carried;
+use crate::permutation::{self, Arranger, Permutation};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{BoardName, CommonArgs};
 use pgs_command::failure::Failure;
-use crate::permutation::{self, Arranger, Permutation};
 use pgs_command::step_input;
 use step_folder::digest;
 use step_folder::folder::Folder;

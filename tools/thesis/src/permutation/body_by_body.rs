@@ -121,9 +121,8 @@ pub(crate) fn order(input: &OrderInput<'_>, ties: Ties) -> Vec<u32> {
         }
     }
     // Pairs of two static bodies belong to no body's turn and come last.
-    order.extend(
-        input.taking_part().map(|(index, _)| index).filter(|index| !done[*index as usize]),
-    );
+    order
+        .extend(input.taking_part().map(|(index, _)| index).filter(|index| !done[*index as usize]));
     order
 }
 

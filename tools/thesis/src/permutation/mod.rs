@@ -233,7 +233,8 @@ mod tests {
     fn every_order_has_each_collision_once() {
         let contacts = [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS];
         let normal = [0.0, 1.0, 0.0];
-        let of = |[body_a, body_b]: [u32; 2]| Collision { body_a, body_b, normal, count: 1, contacts };
+        let of =
+            |[body_a, body_b]: [u32; 2]| Collision { body_a, body_b, normal, count: 1, contacts };
         let pairs = [[0, 4], [4, 1], [1, 2], [2, 3], [3, 0], [2, 0], [4, 3]];
         let (bodies, shapes) = (vec![body(); 5], [Shape::isotropic(1.0, 1.0)]);
         for permutation in WORDS.iter().map(|(_, order)| *order).chain([Permutation::Random(3)]) {

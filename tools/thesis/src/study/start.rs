@@ -10,13 +10,13 @@ use zynq_pgs::{Body, Shape, StepParameters};
 
 use super::run::{Run, World};
 use crate::formats::{EACH_ONCE, numbers};
+use crate::permutation::{self, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
-use crate::permutation::{self, Permutation};
 use pgs_command::pile;
 use pgs_command::step_input;
 use scene::Scene;

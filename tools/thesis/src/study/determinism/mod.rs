@@ -14,12 +14,12 @@ use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving};
 use crate::experiment::Measured;
 use crate::histogram::Histogram;
+use crate::permutation::Permutation;
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
 use pgs_command::failure::Failure;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::is_sequential;
-use crate::permutation::Permutation;
 
 const EXAMPLES: &str = "\
 Examples:
