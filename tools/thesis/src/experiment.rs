@@ -20,6 +20,16 @@ pub(crate) const SCHEMA: u32 = 3;
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
 
+/// The boards that an experiment steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Boards {
+    None,
+    /// Emulated ones that it builds itself.
+    Own,
+    /// One that the user names.
+    Any,
+}
+
 /// An experiment of the thesis part.
 pub(crate) trait Experiment: Sync {
     /// Its name on the command line.
@@ -31,8 +41,8 @@ pub(crate) trait Experiment: Sync {
     /// Its subject, in a line.
     fn about(&self) -> &'static str;
 
-    /// Whether it steps a board.
-    fn opens_board(&self) -> bool;
+    /// The boards that it steps.
+    fn boards(&self) -> Boards;
 
     /// Adds its arguments and its help.
     fn arguments(&self, command: Command) -> Command;
@@ -146,7 +156,7 @@ pub(crate) struct Measured<A> {
     pub(crate) id: &'static str,
     pub(crate) thesis: &'static str,
     pub(crate) about: &'static str,
-    pub(crate) opens_board: bool,
+    pub(crate) boards: Boards,
     pub(crate) run: fn(&A, &Session) -> Result<Part, Failure>,
 }
 
@@ -163,8 +173,8 @@ impl<A: Args> Experiment for Measured<A> {
         self.about
     }
 
-    fn opens_board(&self) -> bool {
-        self.opens_board
+    fn boards(&self) -> Boards {
+        self.boards
     }
 
     fn arguments(&self, command: Command) -> Command {

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
 use pgs_command::board::{self, ChosenBoard};
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::options::build::{BuildArgs, board_option};
 use pgs_command::output::SCHEMA;
@@ -36,6 +36,10 @@ Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fail
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     /// Build the emulated board with a defect, to see how the test reports it
     #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
     quirk: Option<QuirkName>,

@@ -8,7 +8,7 @@ use clap::Args;
 use pgs_loading::{AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use serde_json::{Value, json};
 
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{CommonArgs, ManagerOptions};
 use pgs_command::failure::{Cause, Failure, INTERRUPTED, Verdict};
 use pgs_command::interrupt;
 use pgs_command::output::{SCHEMA, milliseconds};
@@ -32,6 +32,8 @@ rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {
+    #[command(flatten)]
+    pub(crate) manager: ManagerOptions,
     /// Bitstream in bootgen's format (.bit.bin).
     file: PathBuf,
     /// Compiled overlay, applied after the bitstream is loaded.

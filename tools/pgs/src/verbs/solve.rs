@@ -12,7 +12,7 @@ use crate::bug_report::FaultArgs;
 use crate::difference::{self, Difference};
 use crate::traced::TracedArgs;
 use pgs_command::board;
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::numbers::{Bound, grouped};
@@ -77,6 +77,10 @@ terms, motion. Poses stay unchanged.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct SolveArgs {
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     /// Folder of .npy arrays.
     #[arg(value_name = "DIR")]
     folder: PathBuf,

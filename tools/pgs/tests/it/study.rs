@@ -235,7 +235,7 @@ fn what_cannot_be_studied_is_refused() {
         (&["determinism", "--input", input, "--hazards", "unchecked"][..], "stale velocities"),
         (&["determinism", "--input", input, "--steps", "3"], "cannot be used with"),
         (&["half", "--input", input, "--grid", "2x2x2"], "cannot be used with"),
-        (&["half", "--grid", "2x2x2", "--board", "uio"], "leave out --board"),
+        (&["half", "--grid", "2x2x2", "--board", "uio"], "unexpected argument '--board'"),
         (&["half", "--grid", "2x2x2", "--build", "halv"], "halv"),
         (&["weather"], "weather"),
     ] {

@@ -20,7 +20,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use self::numbers::{AS_STREAMED, Numbers, SUMS};
 pub(crate) use self::numbers::{EACH_ONCE, numbers};
 pub(crate) use self::tally::{Loss, Sizes};
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::narrow::NarrowFormat;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
@@ -44,7 +44,7 @@ pub(crate) static FORMATS: Measured<FormatsArgs> = Measured {
     id: "formats",
     thesis: "§4.6.2, Figures 4.5 to 4.8",
     about: "The sizes of a step's numbers, and their errors in 16-bit formats",
-    opens_board: true,
+    boards: Boards::Any,
     run: measure,
 };
 

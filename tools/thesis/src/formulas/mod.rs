@@ -22,7 +22,7 @@ use serde_json::json;
 
 use self::scene::Scene;
 use crate::estimate::{DESIGNS, StepShape, thesis};
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::table::Table;
 
 const HELP: &str = "\
@@ -138,7 +138,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "step",
             thesis: "Tables 6.4 and 6.8",
             about: "Cycles and time of a step, and what world inertia costs",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(step::tables),
         },
         step::tables,
@@ -148,7 +148,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "mixed",
             thesis: "§7.3",
             about: "A design of ours, mixed, against float",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(mixed::tables),
         },
         mixed::tables,
@@ -158,7 +158,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "windowed",
             thesis: "§4.7, §7.3",
             about: "Two designs that stream the collisions once, against float",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(windowed::tables),
         },
         windowed::tables,
@@ -168,7 +168,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "data",
             thesis: "§4.4.1, Tables 4.1 to 4.6",
             about: "Words in and out",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(data::tables),
         },
         data::tables,
@@ -178,7 +178,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "memory",
             thesis: "§4.4.2, Tables 6.4 and 6.8",
             about: "On-chip memory and logic",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(memory::tables),
         },
         memory::tables,
@@ -188,7 +188,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "streams",
             thesis: "§5.4.2",
             about: "Stream widths and memory bandwidth",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(memory::streams),
         },
         memory::streams,
@@ -198,7 +198,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "ports",
             thesis: "§5.4.3, §5.5",
             about: "Block RAM ports and the initiation interval",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(ports::tables),
         },
         ports::tables,
@@ -208,7 +208,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "warm",
             thesis: "§2.2.3",
             about: "The cost of a warm start",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(warm::tables),
         },
         warm::tables,
@@ -218,7 +218,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "comparison",
             thesis: "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
             about: "Speed-up and energy against GPU and CPU",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(comparison::tables),
         },
         comparison::tables,
@@ -228,7 +228,7 @@ pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
             id: "euler",
             thesis: "§2.1.3, Figure 2.6",
             about: "Explicit integration of a fall",
-            opens_board: false,
+            boards: Boards::None,
             run: |args, _| args.part(euler::tables),
         },
         euler::tables,

@@ -15,7 +15,7 @@ use zynq_pgs::order::{IssueWindow, OrderError};
 
 use self::rows::Measured as Rows;
 use self::source::Source;
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 
@@ -38,7 +38,7 @@ pub(crate) static ORDER: Measured<OrderArgs> = Measured {
     id: "order",
     thesis: "§4.7, Algorithm 3",
     about: "The cost of each order of the collisions: hazards, empty slots, live bodies, host time",
-    opens_board: true,
+    boards: Boards::Any,
     run: measure,
 };
 

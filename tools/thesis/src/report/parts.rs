@@ -42,7 +42,7 @@ pub(super) fn gather(
     }
     bar.enable_steady_tick(TICK);
     let session = Session::within(common, interrupt.clone(), bar.clone());
-    let gathered = session.emulated().and_then(|common| of_all(args, &common, &session, &bar));
+    let gathered = of_all(args, &session.emulated(), &session, &bar);
     bar.finish_and_clear();
     gathered
 }

@@ -17,7 +17,7 @@ use yardstick::Yardstick;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 use pgs_command::board;
@@ -46,7 +46,7 @@ pub(crate) static SPLIT: Measured<Options> = Measured {
     id: "split",
     thesis: "§4.4, equation 6.5",
     about: "The shares of collision search and response in a step, and what a faster response gains",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 

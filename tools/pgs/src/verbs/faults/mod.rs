@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
-use pgs_command::common::{AcceleratorChoice, CommonArgs};
+use pgs_command::common::{AcceleratorChoice, AcceleratorOptions, CommonArgs};
 use pgs_command::environment;
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::output::SCHEMA;
@@ -48,6 +48,8 @@ A cell is one fault at one place. It passes if the fault happened, and
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     /// Try this profile only.
     #[arg(long, value_name = "PROFILE", value_parser = pgs_command::options::build::profile())]
     profile: Option<&'static Profile>,

@@ -25,7 +25,7 @@ use crate::bug_report::FaultArgs;
 use crate::footprint::Footprint;
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use pgs_command::board::{self, OpenBoard};
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::build::BuildArgs;
@@ -70,13 +70,20 @@ kinetic energy of the velocities that moved the bodies, which is 0 for a pile at
 step on the board, modelled for an emulated board; time of this machine. With --beside-cold the depth
 and the energy of the same scene without a warm start and with one friction, stepped beside it.";
 
+/// The end of the short help.
+const MORE: &str = "`pgs run --help` has all options, by subject, and examples.";
+
 /// Default rows of the table.
 const ROWS: u32 = 15;
 
 /// Step a pile dropped on the ground.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = MORE, after_long_help = EXAMPLES)]
 pub(crate) struct RunArgs {
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     /// Steps to take [default: 120 for cubes, 600 for shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
@@ -90,8 +97,9 @@ pub(crate) struct RunArgs {
     wide: bool,
     #[command(flatten)]
     solver: SolverArgs,
-    /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
-    /// [default: on for --scene shapes]
+    /// Begin each step with the impulses of the last one
+    ///
+    /// With 0.85 of them, in one more pass of each kind [default: on for --scene shapes]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     warm_start: Option<bool>,
     /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on for

@@ -12,7 +12,7 @@ use super::run::Run;
 use super::spread::Spread;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::histogram::Histogram;
 use crate::permutation::Permutation;
 use crate::session::Session;
@@ -45,7 +45,7 @@ pub(crate) static ORDERS: Measured<Options> = Measured {
     id: "determinism",
     thesis: "§4.5, §4.6.3, Figures 4.2 and 4.9",
     about: "The same steps with collisions in different orders",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 

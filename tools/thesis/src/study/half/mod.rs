@@ -14,7 +14,7 @@ use super::recorded::{HALF_AGAINST_FLOAT, RecordedDeviation};
 use super::run::Run;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving, unmoved_share};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::histogram::Histogram;
 use crate::narrow::carried;
 use crate::session::Session;
@@ -43,7 +43,7 @@ pub(crate) static HALF: Measured<Options> = Measured {
     id: "half",
     thesis: "§4.6, Figure 4.10",
     about: "Sixteen bits beside float",
-    opens_board: true,
+    boards: Boards::Own,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
@@ -142,7 +142,7 @@ impl<'a> Side<'a> {
 
 /// Steps all boards and compares them with float.
 pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
-    let common = session.emulated()?;
+    let common = session.emulated();
     let mut start = Start::load(&options.start)?;
     let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
     let mut opened = start.open(&original, &common, session)?;

@@ -9,7 +9,7 @@ mod designs;
 mod show;
 
 use crate::estimate::{StepShape, thesis};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use clap::Args;
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ pub(crate) static LADDER: Measured<Options> = Measured {
     id: "ladder",
     thesis: "Chapter 5",
     about: "The designs of chapter 5, from register accesses to sixteen bits",
-    opens_board: false,
+    boards: Boards::None,
     run: |options, _| Ok(measure(options).part()),
 };
 

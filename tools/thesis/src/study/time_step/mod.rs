@@ -12,7 +12,7 @@ use serde::Serialize;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
@@ -47,7 +47,7 @@ pub(crate) static TIME_STEP: Measured<Options> = Measured {
     id: "time-step",
     thesis: "§2.1.1, Figure 2.2",
     about: "A body in flight and a pile with time steps from 1/480 s to 1/15 s",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
