@@ -46,6 +46,8 @@ pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
         &study::time_step::TIME_STEP,
         &study::stopping::STOPPING,
         &study::split::SPLIT,
+        &study::pile::PILE,
+        &study::stages::STAGES,
         &study::determinism::ORDERS,
         &study::half::HALF,
         &study::ladder::LADDER,
@@ -54,7 +56,7 @@ pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
         &detect::DETECTION,
         &compare::COMPARE,
     ];
-    all.extend(formulas::FORMULAS.iter().map(|(formula, _)| formula as &dyn Experiment));
+    all.extend(formulas::FORMULAS.iter().map(|formula| formula as &dyn Experiment));
     all.sort_by_key(|experiment| section_key(experiment.thesis()));
     all
 }

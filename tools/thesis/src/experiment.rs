@@ -1,6 +1,7 @@
 //! An experiment: a place of the thesis, arguments, and a run that leads to tables and figures.
 
 use std::io::Write;
+use std::path::Path;
 
 use clap::{ArgMatches, Args, Command};
 use pgs_command::failure::{Failure, Verdict};
@@ -12,7 +13,7 @@ use serde_json::{Value, json};
 use crate::figure::Figure;
 use crate::index::{Row, section_key};
 use crate::session::Session;
-use crate::table::Table;
+use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub(crate) const SCHEMA: u32 = 3;
@@ -51,6 +52,13 @@ pub(crate) trait Experiment: Sync {
     fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure>;
 }
 
+/// A folder as a figure names it: as it was given, or only its name. A page is passed on, and the
+/// folders of its author's machine mean nothing to its readers.
+pub(crate) fn shown(folder: &Path) -> String {
+    let name = folder.file_name().filter(|_| folder.is_absolute());
+    name.map_or(folder, Path::new).display().to_string()
+}
+
 /// The findings of an experiment.
 #[derive(Debug, Default)]
 pub(crate) struct Part {
@@ -77,6 +85,19 @@ impl Part {
     pub(crate) fn with(mut self, outcome: &impl Serialize) -> Self {
         self.data = serde_json::to_value(outcome).unwrap_or_else(|_| json!({}));
         self
+    }
+
+    /// Adds a figure, and the rows of the index that lead to it.
+    pub(crate) fn figure(&mut self, figure: Figure, rows: impl IntoIterator<Item = Row>) {
+        self.figures.push(figure);
+        self.rows.extend(rows);
+    }
+
+    /// Names the command that prints the rows, where they name no other.
+    pub(crate) fn printed_by(&mut self, command: &str) {
+        for row in self.rows.iter_mut().filter(|row| row.command.is_empty()) {
+            command.clone_into(&mut row.command);
+        }
     }
 
     /// Adds the figures and rows of another part behind this one's.
@@ -120,12 +141,23 @@ impl Part {
         document
     }
 
+    /// The rows of the index as a table, of an experiment that has no other.
+    fn index(&self) -> Option<Table> {
+        let columns =
+            [("thesis", "thesis"), ("subject", ""), ("recorded", "its figure"), ("ours", "ours")];
+        let mut table = Table::new("index", "Beside the thesis", &columns);
+        for Row { thesis, subject, recorded, ours, .. } in &self.rows {
+            table.row([thesis, subject, recorded, ours].map(text));
+        }
+        self.tables.is_empty().then_some(table)
+    }
+
     /// For people.
     pub(crate) fn write_text(&self, out: &mut dyn Write) -> Result<(), Failure> {
         for (label, text) in &self.facts {
             fact(out, label, text)?;
         }
-        for table in &self.tables {
+        for table in self.tables.iter().chain(&self.index()) {
             write!(out, "\n{}", table.to_text(stdout_width()))?;
         }
         if !self.complete && self.agrees {
@@ -144,7 +176,7 @@ impl Part {
         for (_, text) in &self.facts {
             writeln!(out, "{text}\n")?;
         }
-        for table in &self.tables {
+        for table in self.tables.iter().chain(&self.index()) {
             write!(out, "{}", table.to_markdown())?;
         }
         Ok(())
@@ -184,5 +216,17 @@ impl<A: Args> Experiment for Measured<A> {
     fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure> {
         let arguments = A::from_arg_matches(matches).map_err(Failure::input)?;
         (self.run)(&arguments, session)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_names_no_folder_above_that_of_the_step() {
+        let names = ["tests/golden/two_cubes", "/home/somebody/two_cubes/", "/"];
+        let found = names.map(|name| shown(Path::new(name)));
+        assert_eq!(found, ["tests/golden/two_cubes", "two_cubes", "/"]);
     }
 }

@@ -1,5 +1,6 @@
 //! Measures the sizes of a step's numbers, and their errors in 16-bit formats.
 
+mod figures;
 mod numbers;
 mod tally;
 
@@ -20,7 +21,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use self::numbers::{AS_STREAMED, Numbers, SUMS};
 pub(crate) use self::numbers::{EACH_ONCE, numbers};
 pub(crate) use self::tally::{Loss, Sizes};
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Measured, Part, shown};
 use crate::narrow::NarrowFormat;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
@@ -92,6 +93,11 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
         Some(path) => part.fact("input", path.display().to_string()),
         None => part.fact("scene", format!("{}, step {}", args.scene.text(), args.step)),
     }
+    let named = match &args.input {
+        Some(path) => format!("the step in {}", shown(path)),
+        None => format!("step {} of our pile of {}", args.step, args.scene.text()),
+    };
+    figures::add(&mut part, &kinds, &named);
     let counts = [bodies.len(), collisions.len()].map(|count| grouped(count as u64));
     part.fact("step", format!("{} bodies, {} collisions", counts[0], counts[1]));
     let config = match &args.input {

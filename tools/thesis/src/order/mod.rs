@@ -1,6 +1,7 @@
 //! Measures each order of a step's collisions, for every depth of the pipeline.
 
 mod cost;
+mod live;
 mod rows;
 mod source;
 
@@ -15,7 +16,7 @@ use zynq_pgs::order::{IssueWindow, OrderError};
 
 use self::rows::Measured as Rows;
 use self::source::Source;
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Measured, Part, shown};
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 
@@ -93,6 +94,13 @@ fn measure(args: &OrderArgs, session: &Session) -> Result<Part, Failure> {
     let measured = rows::measure(&source, &windows, args.runs).map_err(refused)?;
     let input = source.input();
     let mut part = Part::of(vec![table(&measured)]);
+    let step = match &args.input {
+        Some(path) => format!("the step in {}", shown(path)),
+        None => source.name.clone(),
+    };
+    for window in windows.iter().take(1) {
+        live::add(&mut part, &input, *window, &step).map_err(refused)?;
+    }
     let scene = format!(
         "{}: {} collisions of {} moving bodies, {:.2} a body",
         source.name,

@@ -1,11 +1,7 @@
 //! All experiments at once: the thesis' tables and figures as a page, as Markdown and as JSON.
 
-mod figures;
 mod page;
 mod parts;
-mod step;
-mod studies;
-mod tables;
 mod text;
 mod write;
 

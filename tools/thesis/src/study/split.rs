@@ -18,6 +18,8 @@ use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
 use crate::experiment::{Boards, Measured, Part};
+use crate::figure::{Figure, bars};
+use crate::index::Row;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 use pgs_command::board;
@@ -279,8 +281,37 @@ impl Outcome {
                 100.0 * self.recorded_share,
             );
             part.fact("share", text);
+            let (figure, row) = self.figure(times.response_share());
+            part.figure(figure, [row]);
         }
         part
+    }
+
+    /// The shares beside the thesis'.
+    fn figure(&self, response: f64) -> (Figure, Row) {
+        let both = |response: f64| [100.0 - 100.0 * response, 100.0 * response];
+        let (recorded, ours) = (both(self.recorded_share), both(response));
+        let figure = Figure::new(
+            ("figure-shares", "§4.4"),
+            "Shares of collision search and collision response",
+            bars(
+                "% of both",
+                &["search", "response"].map(str::to_owned),
+                &["recorded", "measured"].map(str::to_owned),
+                &[0, 1].map(|part| vec![Some(recorded[part]), Some(ours[part])]),
+            ),
+            format!(
+                "a pile of {} cubes, in processor time of one thread of this host. The thesis names \
+                 neither its processor nor its program for the shares.",
+                self.grid
+            ),
+        );
+        let shown = |[search, response]: [f64; 2], digits: usize| {
+            format!("{search:.digits$} % search, {response:.digits$} % response")
+        };
+        let on_host = format!("{}, on one core of this host", shown(ours, 1));
+        let row = figure.row("shares of a step", shown(recorded, 0), on_host);
+        (figure, row)
     }
 
     fn of_gains(&self) -> Table {

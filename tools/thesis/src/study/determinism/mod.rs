@@ -88,6 +88,8 @@ pub(crate) struct Outcome {
     pub(crate) recorded: [RecordedDeviation; 2],
     #[serde(skip)]
     start_text: String,
+    #[serde(skip)]
+    subject: String,
 }
 
 /// Two orders.
@@ -200,6 +202,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         pairs: of_pairs,
         recorded: [TWO_GPU_RUNS, FLOAT_AGAINST_GPU],
         start_text: start.text(),
+        subject: start.subject(),
     })
 }
 

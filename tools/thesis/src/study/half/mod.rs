@@ -1,5 +1,6 @@
 //! Thesis §4.6: the scene in sixteen bits beside float, after one step and after many.
 
+mod figures;
 mod show;
 mod splits;
 
@@ -79,6 +80,8 @@ pub(crate) struct Outcome {
     pub(crate) recorded: [RecordedDeviation; 1],
     #[serde(skip)]
     start_text: String,
+    #[serde(skip)]
+    subject: String,
 }
 
 /// A build beside float.
@@ -215,6 +218,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         splits: splits::of(&start.numbers(&mut of_splits)),
         recorded: [HALF_AGAINST_FLOAT],
         start_text: start.text(),
+        subject: start.subject(),
     })
 }
 

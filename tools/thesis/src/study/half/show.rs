@@ -22,6 +22,7 @@ impl Outcome {
         for recorded in &self.recorded {
             part.fact("recorded", recorded.text());
         }
+        self.add_figure(&mut part);
         part
     }
 

@@ -1,7 +1,9 @@
 //! The table of the ladder, with the formula of each design.
 
-use super::Outcome;
+use super::{Outcome, Rung};
 use crate::experiment::Part;
+use crate::figure::{Figure, bars};
+use crate::index::Row;
 use crate::table::{Cell, Table, text};
 use pgs_command::numbers::grouped;
 
@@ -59,6 +61,40 @@ impl Outcome {
             self.passes
         );
         part.fact("step", step);
+        let (figure, rows) = self.figure();
+        part.figure(figure, rows);
         part
+    }
+
+    /// The factor of each design.
+    fn figure(&self) -> (Figure, Vec<Row>) {
+        let names: Vec<String> = self.rungs.iter().map(|rung| rung.design.to_owned()).collect();
+        let factors: Vec<_> = self.rungs.iter().map(|rung| vec![rung.factor]).collect();
+        let figure = Figure::new(
+            ("figure-ladder", "Chapter 5"),
+            "How many times as fast each design is as the one before it",
+            bars("times", &names, &["over the design before".to_owned()], &factors),
+            "From words that the processor writes one by one to half precision, on the thesis' step.",
+        )
+        .modelled();
+        let row = |rung: &Rung, subject: &str, recorded: String, ours| Row {
+            thesis: rung.thesis.to_owned(),
+            ..figure.row(format!("{subject}: {}", rung.design), recorded, ours)
+        };
+        let mut rows = Vec::new();
+        for rung in &self.rungs {
+            let recorded = rung.recorded_cycles.map_or("not given".to_owned(), grouped);
+            let ours = format!("{} ({:.2} ms)", grouped(rung.cycles), rung.milliseconds);
+            rows.push(row(rung, "cycles of a step", recorded, ours));
+            let intervals = rung.interval_by_streams.zip(rung.interval_by_ports);
+            let Some((recorded, (streams, ports))) = rung.recorded_interval.zip(intervals) else {
+                continue;
+            };
+            let most = streams.max(ports);
+            let ours = format!("{most}: {streams} by the streams, {ports} by the ports");
+            let subject = "cycles from an issue to the next (II)";
+            rows.push(row(rung, subject, recorded.to_string(), ours));
+        }
+        (figure, rows)
     }
 }

@@ -1,7 +1,9 @@
 //! The tables of both scenes.
 
-use super::{Flight, Outcome};
+use super::{Flight, Outcome, Row};
 use crate::experiment::Part;
+use crate::figure::{Axis, Drawn, Figure, Series, lines};
+use crate::index::Row as RowOfIndex;
 use crate::table::{Cell, Table, text};
 
 impl Outcome {
@@ -62,6 +64,42 @@ impl Outcome {
                  iterations"
             ),
         );
+        let (figure, row) = self.figure();
+        part.figure(figure, [row]);
         part
+    }
+
+    /// Figure 2.2: accuracy and cost against the time step.
+    fn figure(&self) -> (Figure, RowOfIndex) {
+        let against = |name: &str, of: &dyn Fn(&Row) -> f64| {
+            let points = self.rows.iter().map(|row| (row.time_step_s * 1e3, of(row)));
+            Series::new(name, Drawn::Marked, points.collect())
+        };
+        let series = [
+            against("body in flight, error in mm", &|row| row.flight.board_m * 1e3),
+            against("pile, deepest penetration in mm", &|row| row.pile.deepest_m * 1e3),
+            against("board time of a simulated second, ms", &|row| row.pile.board_ms_per_second),
+        ];
+        let figure = Figure::new(
+            ("figure-2-2", "§2.1.1, Figure 2.2"),
+            "Speed and accuracy against the time step",
+            lines(Axis::linear("time step, ms"), Axis::log("error in mm, cost in ms"), &series),
+            format!(
+                "{} s of a pile of {} cubes. A shorter step costs more board time (modelled) a simulated \
+                 second, and leaves smaller errors (measured).",
+                self.seconds, self.grid
+            ),
+        );
+        let at = |rate: u16| self.rows.iter().find(|row| row.steps_per_second == rate);
+        let ours = [480, 60, 15].into_iter().filter_map(at).map(|row| {
+            let (rate, off) = (row.steps_per_second, row.flight.board_m * 1e3);
+            format!("1/{rate} s: {off:.0} mm off, {:.1} ms a second", row.pile.board_ms_per_second)
+        });
+        let row = figure.row(
+            "accuracy against the time step",
+            "a smaller step is more accurate and slower (no numbers)",
+            ours.collect::<Vec<_>>().join("; "),
+        );
+        (figure, row)
     }
 }
