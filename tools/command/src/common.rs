@@ -25,19 +25,28 @@ const HEADING: &str = "Board";
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = HEADING)]
 pub struct BoardOptions {
-    /// Board to use: auto, uio[:NODE], devmem, emulated, socket:PATH
-    ///
-    /// auto is the UIO node "pgs" if there is one, else emulated. uio is the UIO node of that name, or
-    /// NODE-control, NODE-dma0 ... for each region. devmem has registers through /dev/mem, at the
-    /// addresses of the interface, and needs root. socket is a board that `pgs serve` serves. [env:
-    /// PGS_BOARD] [default: auto]
-    #[arg(long, value_name = "BOARD", value_parser = board_name)]
+    /// Board to use.
+    #[arg(
+        help = "Board to use: auto, uio[:NODE], devmem, emulated, socket:PATH",
+        long_help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), \
+                     uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for each \
+                     region), devmem (registers through /dev/mem, at the addresses of the interface; \
+                     needs root), emulated or socket:PATH (one that `pgs serve` serves) [env: \
+                     PGS_BOARD] [default: auto]",
+        long,
+        value_name = "BOARD",
+        value_parser = board_name
+    )]
     board: Option<BoardName>,
-    /// DMA memory of a real board
-    ///
-    /// auto (the u-dma-buf "pgs", else the UIO node "pgs-memory"), u-dma-buf[:NAME[:write-combining]],
-    /// uio[:NODE] or devmem[:ADDRESS+BYTES] [env: PGS_MEMORY] [default: auto]
-    #[arg(long, hide_short_help = true, value_name = "MEMORY", value_parser = memory_choice)]
+    /// DMA memory of a real board.
+    #[arg(
+        help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
+                \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
+                devmem[:ADDRESS+BYTES] [env: PGS_MEMORY] [default: auto]",
+        long,
+        value_name = "MEMORY",
+        value_parser = memory_choice
+    )]
     memory: Option<MemoryChoice>,
     #[command(flatten)]
     manager: ManagerOptions,
@@ -47,12 +56,16 @@ pub struct BoardOptions {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = HEADING)]
 pub struct ManagerOptions {
-    /// FPGA manager that knows whether a real board's logic is programmed
-    ///
-    /// auto (the ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic that
-    /// the kernel did not load, for example by JTAG. WARNING: an access to logic that is not programmed
-    /// hangs the processor) [env: PGS_MANAGER] [default: auto]
-    #[arg(long, hide_short_help = true, value_name = "MANAGER", value_parser = manager_choice)]
+    /// FPGA manager of a real board's logic.
+    #[arg(
+        help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
+                ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic \
+                that the kernel did not load, for example by JTAG. WARNING: an access to logic that \
+                is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+        long,
+        value_name = "MANAGER",
+        value_parser = manager_choice
+    )]
     manager: Option<ManagerChoice>,
 }
 
@@ -60,12 +73,16 @@ pub struct ManagerOptions {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = HEADING)]
 pub struct AcceleratorOptions {
-    /// Accelerator of an emulated board
-    ///
-    /// model, rtl:PATH, a simulator of the generated Verilog (`rtlgen simulator` builds one), or
-    /// both:PATH, the simulator with the model beside it on the same beats, up to the first difference
-    /// [env: PGS_RTL, the PATH of rtl] [default: model]
-    #[arg(long, hide_short_help = true, value_name = "ACCELERATOR", value_parser = accelerator_choice)]
+    /// Accelerator of an emulated board.
+    #[arg(
+        help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
+                Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the model \
+                beside it on the same beats, up to the first difference [env: PGS_RTL, the PATH of \
+                rtl] [default: model]",
+        long,
+        value_name = "ACCELERATOR",
+        value_parser = accelerator_choice
+    )]
     accelerator: Option<AcceleratorChoice>,
 }
 

@@ -60,7 +60,10 @@ pub(super) fn measure(
                 Kind::Fixed(fixed) => schedule.clone_from(fixed),
                 Kind::Permuted(making) => {
                     if place == 0 {
-                        let cost = || Ok(schedule = in_order(making(&input)));
+                        let cost = || {
+                            schedule = in_order(making(&input));
+                            Ok(())
+                        };
                         host_ns = Some(cost::per_collision(&input, runs, cost)?);
                     }
                 }
