@@ -4,7 +4,6 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::profile::Variant;
 use pgs_interface::record::{BEAT_BYTES, Beat};
 
-use crate::beat::bare;
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::PackPool;
@@ -137,17 +136,6 @@ impl StepPacker {
         let (of_bodies, bodies_good) = self.bodies(bodies, target);
         let (of_collisions, good) = self.entries(collisions, added, target);
         Ok((bodies_good & good).then(|| of_bodies.wrapping_add(of_collisions)))
-    }
-
-    /// Reads collisions, and writes as many bytes as their records have without making records;
-    /// returns the number of collisions. It leaves out an incomplete unit of records at the end, and
-    /// collisions that are not stored as structures.
-    pub fn deal_bare<C: Collisions + ?Sized>(&mut self, collisions: &C) -> usize {
-        let variant = self.limits.variant;
-        let target = Target { variant: &variant, shapes: &[], streamed_masses: false, quick: None };
-        let count = collisions.len();
-        let channels = &mut channels(&mut self.collisions, Segment::Collisions, count, target);
-        bare::deal(&variant, collisions, &mut channels[..variant.profile.mm2s_widths.len()])
     }
 
     /// Bytes of the records of `bodies` bodies, and of `collisions` collisions.

@@ -98,7 +98,8 @@ pub use check::{CheckLine, CheckReport, Outcome, check};
 pub use control_block::{Capabilities, ControlError, IdentityError, Saturated};
 pub use error::{Aftermath, BoardTextError, Error, OpenError};
 pub use fault::{
-    AcceleratorError, Awaited, ChannelState, ControlState, Diagnosis, Fault, Phase, Subject,
+    AcceleratorError, Awaited, ChannelFault, ChannelState, ControlState, Diagnosis, Fault, Phase,
+    Subject,
 };
 pub use pgs_interface as interface;
 pub use platform::{

@@ -1,7 +1,5 @@
 //! Lays records out over the channels of a board, and reads results back from them.
 
-#[cfg(feature = "bench")]
-pub(crate) mod bare;
 mod format;
 pub(crate) mod pack;
 pub(crate) mod stripe;

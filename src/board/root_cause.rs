@@ -10,7 +10,7 @@ use crate::axi_dma::{ChannelName, Direction};
 use crate::control_block::{Changed, StickyError};
 use crate::fault::diagnosis::{ChannelState, ControlState, Diagnosis};
 use crate::fault::phase::Phase;
-use crate::fault::{AcceleratorError, Awaited, Fault, Subject};
+use crate::fault::{AcceleratorError, Awaited, ChannelFault, Fault, Subject};
 
 impl Device {
     /// Finds the cause of a failure: the fault, and the state of the board, unless the board had no
@@ -85,7 +85,7 @@ fn standing(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
         // A wrong chain that is right by now. A wrong status is kept in the diagnosis.
         (None, Symptom::Status { place, .. } | Symptom::Chain { place }) => {
             match diagnosis.channels.get(place) {
-                Some(state) => Fault::ShortPacket(Box::new(*state)),
+                Some(state) => of(ChannelFault::ShortPacket, state),
                 None => Fault::Gone { region: "the board".to_owned() },
             }
         }
@@ -113,24 +113,25 @@ pub(crate) fn other_bitstream(Changed { register, expected, found }: Changed) ->
     Fault::OtherBitstream { register, expected, found }
 }
 
-/// A fault of a channel that stopped.
-type Stopped = fn(Box<ChannelState>) -> Fault;
+/// The fault of a channel.
+fn of(cause: ChannelFault, state: &ChannelState) -> Fault {
+    Fault::Channel { cause, at: Box::new(*state) }
+}
 
 /// The channel that stopped with an error; among several, the channel at the earliest phase.
 fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
     let with_errors = diagnosis.channels.iter().filter(|state| state.status.errors() != 0);
     let state = with_errors.min_by_key(|state| state.phase)?;
-    let at = Box::new(*state);
     let shows = |bit: u32| state.status.errors() & bit != 0;
-    let kinds: [(u32, Stopped); 5] = [
-        (dmasr::DMA_DEC_ERR.mask(), Fault::DmaDecode),
-        (dmasr::DMA_SLV_ERR.mask(), Fault::DmaSlave),
-        (dmasr::SG_DEC_ERR.mask(), Fault::SgDecode),
-        (dmasr::SG_SLV_ERR.mask(), Fault::SgSlave),
-        (dmasr::SG_INT_ERR.mask(), Fault::SgInternal),
+    let kinds = [
+        (dmasr::DMA_DEC_ERR.mask(), ChannelFault::DmaDecode),
+        (dmasr::DMA_SLV_ERR.mask(), ChannelFault::DmaSlave),
+        (dmasr::SG_DEC_ERR.mask(), ChannelFault::SgDecode),
+        (dmasr::SG_SLV_ERR.mask(), ChannelFault::SgSlave),
+        (dmasr::SG_INT_ERR.mask(), ChannelFault::SgInternal),
     ];
-    if let Some((_, fault)) = kinds.into_iter().find(|(bit, _)| shows(*bit)) {
-        return Some(fault(at));
+    if let Some((_, cause)) = kinds.into_iter().find(|(bit, _)| shows(*bit)) {
+        return Some(of(cause, state));
     }
     // The receiver's buffers are full, no descriptor has failed, and the packet goes on.
     let overrun = state.channel.direction == Direction::S2mm
@@ -138,7 +139,8 @@ fn stopped(diagnosis: &Diagnosis) -> Option<Fault> {
         && state.descriptors > 0
         && state.packet_end.is_none();
     let failed = state.descriptor.is_some_and(|descriptor| descriptor.status.failed());
-    Some(if overrun && !failed { Fault::LongPacket(at) } else { Fault::DmaInternal(at) })
+    let long = overrun && !failed;
+    Some(of(if long { ChannelFault::LongPacket } else { ChannelFault::DmaInternal }, state))
 }
 
 /// The channel that a reset has halted: it was started, and no channel shows an error.
@@ -154,14 +156,14 @@ fn failed_descriptor(diagnosis: &Diagnosis) -> Option<Fault> {
         (errors != 0).then_some((state, errors))
     });
     let (state, errors) = failed.min_by_key(|(state, _)| state.phase)?;
-    let at = Box::new(*state);
-    Some(if errors & status::DMA_DEC_ERR.mask() != 0 {
-        Fault::DescriptorDecode(at)
+    let cause = if errors & status::DMA_DEC_ERR.mask() != 0 {
+        ChannelFault::DescriptorDecode
     } else if errors & status::DMA_SLV_ERR.mask() != 0 {
-        Fault::DescriptorSlave(at)
+        ChannelFault::DescriptorSlave
     } else {
-        Fault::DescriptorInternal(at)
-    })
+        ChannelFault::DescriptorInternal
+    };
+    Some(of(cause, state))
 }
 
 /// The accelerator's own error: the current one, or the one that was seen.
@@ -204,17 +206,12 @@ pub(crate) fn decoded(StickyError { raw, detail }: StickyError, phase: Phase) ->
 fn wrong_packet(diagnosis: &Diagnosis) -> Option<Fault> {
     let receivers =
         diagnosis.channels.iter().filter(|state| state.channel.direction == Direction::S2mm);
-    receivers.filter(|state| state.descriptors > 0).find_map(|state| {
-        let at = || Box::new(*state);
-        match state.packet_end {
-            Some(end)
-                if end + 1 < state.descriptors || state.bytes_moved < state.bytes_expected =>
-            {
-                Some(Fault::ShortPacket(at()))
-            }
-            None if state.done() => Some(Fault::NoPacketEnd(at())),
-            _ => None,
+    receivers.filter(|state| state.descriptors > 0).find_map(|state| match state.packet_end {
+        Some(end) if end + 1 < state.descriptors || state.bytes_moved < state.bytes_expected => {
+            Some(of(ChannelFault::ShortPacket, state))
         }
+        None if state.done() => Some(of(ChannelFault::NoPacketEnd, state)),
+        _ => None,
     })
 }
 
@@ -222,7 +219,7 @@ fn wrong_packet(diagnosis: &Diagnosis) -> Option<Fault> {
 fn status_missing(diagnosis: &Diagnosis, awaited: Awaited) -> Option<Fault> {
     let silent = |state: &&ChannelState| state.status.idle() && !state.done();
     let state = diagnosis.channels.iter().find(silent).filter(|_| awaited == Awaited::Results)?;
-    Some(Fault::StatusMissing(Box::new(*state)))
+    Some(of(ChannelFault::StatusMissing, state))
 }
 
 /// The one channel that is behind all others of its direction: the only sender at the earliest

@@ -1,7 +1,9 @@
 //! The faults of a step that has begun: one per cause, each with a stable name.
+mod channel;
 pub(crate) mod diagnosis;
 pub(crate) mod phase;
 
+pub use channel::ChannelFault;
 pub use diagnosis::{ChannelState, ControlState, Diagnosis};
 pub use phase::Phase;
 
@@ -23,79 +25,14 @@ use crate::platform::PlatformError;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A channel stopped with `DMAIntErr`.
-    #[error(
-        "DMAIntErr on {0}: a descriptor of no bytes, or an error inside the core; is the memory of \
-         the descriptors what the core sees? see `pgs check`"
-    )]
-    DmaInternal(Box<ChannelState>),
-    /// A channel stopped with `DMASlvErr`.
-    #[error(
-        "DMASlvErr on {0}: the memory refused a buffer; is it protected, or behind an \
-         SMMU that has no mapping for this port?"
-    )]
-    DmaSlave(Box<ChannelState>),
-    /// A channel stopped with `DMADecErr`.
-    #[error(
-        "DMADecErr on {0}: nothing answers at the address of a buffer; is this \
-         memory assigned to the port in the block design, and are its addresses wide enough?"
-    )]
-    DmaDecode(Box<ChannelState>),
-    /// A channel stopped with `SGIntErr`.
-    #[error(
-        "SGIntErr on {0}: it fetched a descriptor that it had completed before; the \
-         memory of the descriptors must not be cached: see `pgs check`"
-    )]
-    SgInternal(Box<ChannelState>),
-    /// A channel stopped with `SGSlvErr`.
-    #[error(
-        "SGSlvErr on {0}: the memory refused a descriptor; is it protected, or behind \
-         an SMMU that has no mapping for the descriptor port?"
-    )]
-    SgSlave(Box<ChannelState>),
-    /// A channel stopped with `SGDecErr`.
-    #[error(
-        "SGDecErr on {0}: nothing answers at the address of a descriptor; the \
-         descriptor port is a master of its own: is it in the address map of the block design?"
-    )]
-    SgDecode(Box<ChannelState>),
-    /// A descriptor ended with `DMAIntErr`, while its channel shows no error.
-    #[error(
-        "DMAIntErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
-         descriptors written by somebody else?"
-    )]
-    DescriptorInternal(Box<ChannelState>),
-    /// A descriptor ended with `DMASlvErr`, while its channel shows no error.
-    #[error(
-        "DMASlvErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
-         descriptors written by somebody else?"
-    )]
-    DescriptorSlave(Box<ChannelState>),
-    /// A descriptor ended with `DMADecErr`, while its channel shows no error.
-    #[error(
-        "DMADecErr in a descriptor of {0}, and none in the channel's status: is the memory of the \
-         descriptors written by somebody else?"
-    )]
-    DescriptorDecode(Box<ChannelState>),
-    /// A channel is idle, and its descriptors are not complete.
-    #[error(
-        "no status in the descriptors of {0}, though the channel is idle: it did not reach memory in \
-         time; the memory of the descriptors must not be cached: see `pgs check`"
-    )]
-    StatusMissing(Box<ChannelState>),
-    /// A packet of results ended too early.
-    #[error(
-        "a packet that ended early on {0}: the accelerator's TLAST comes too soon, or beats were lost"
-    )]
-    ShortPacket(Box<ChannelState>),
-    /// A packet of results went on after its last beat.
-    #[error(
-        "more than the results on {0}: the accelerator's TLAST comes too late, or beats were doubled"
-    )]
-    LongPacket(Box<ChannelState>),
-    /// A packet of results is complete and has no TLAST.
-    #[error("no TLAST on {0}: is it connected between the accelerator and this channel?")]
-    NoPacketEnd(Box<ChannelState>),
+    /// A channel failed, or a packet has another length than the results.
+    #[error("{}", cause.text(at))]
+    Channel {
+        /// The way in which it failed.
+        cause: ChannelFault,
+        /// The channel, as it was found.
+        at: Box<ChannelState>,
+    },
     /// The accelerator stopped with an error.
     #[error("{0}")]
     Accelerator(Box<AcceleratorError>),
@@ -208,19 +145,7 @@ impl Fault {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
-            Self::DmaInternal(_) => "dma-internal-error",
-            Self::DmaSlave(_) => "dma-slave-error",
-            Self::DmaDecode(_) => "dma-decode-error",
-            Self::SgInternal(_) => "sg-internal-error",
-            Self::SgSlave(_) => "sg-slave-error",
-            Self::SgDecode(_) => "sg-decode-error",
-            Self::DescriptorInternal(_) => "descriptor-internal-error",
-            Self::DescriptorSlave(_) => "descriptor-slave-error",
-            Self::DescriptorDecode(_) => "descriptor-decode-error",
-            Self::StatusMissing(_) => "descriptor-status-missing",
-            Self::ShortPacket(_) => "short-packet",
-            Self::LongPacket(_) => "long-packet",
-            Self::NoPacketEnd(_) => "no-tlast",
+            Self::Channel { cause, .. } => cause.name(),
             Self::Accelerator(error) => error.name(),
             Self::Deadline { awaited: Awaited::Results, .. } => "deadline",
             Self::Deadline { awaited: Awaited::Done, .. } => "no-done",
@@ -245,19 +170,7 @@ impl Fault {
     #[must_use]
     pub fn channel(&self) -> Option<ChannelName> {
         match self {
-            Self::DmaInternal(at)
-            | Self::DmaSlave(at)
-            | Self::DmaDecode(at)
-            | Self::SgInternal(at)
-            | Self::SgSlave(at)
-            | Self::SgDecode(at)
-            | Self::DescriptorInternal(at)
-            | Self::DescriptorSlave(at)
-            | Self::DescriptorDecode(at)
-            | Self::StatusMissing(at)
-            | Self::ShortPacket(at)
-            | Self::LongPacket(at)
-            | Self::NoPacketEnd(at) => Some(at.channel),
+            Self::Channel { at, .. } => Some(at.channel),
             Self::Accelerator(error) => error.channel,
             Self::Deadline { behind, .. } => *behind,
             _ => None,

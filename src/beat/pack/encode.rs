@@ -131,8 +131,6 @@ macro_rules! each {
         })*
     };
 }
-#[cfg(feature = "bench")]
-pub(crate) use each;
 
 impl<'p, L, E: Lookup<'p>, W: Witness, const MOST_FULL: bool> Encoding<L, E, W, MOST_FULL> {
     /// The record of one collision of the block, which the witness sees.

@@ -12,7 +12,8 @@ use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
 use crate::{
-    Accelerator, Aftermath, Direction, Error, Fault, Phase, Shape, StepParameters, StepReport,
+    Accelerator, Aftermath, ChannelFault, Direction, Error, Fault, Phase, Shape, StepParameters,
+    StepReport,
 };
 
 const DMASR: u32 = 0x04;
@@ -101,7 +102,9 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     // 21 bodies are 84 beats of results, 21 a channel.
     tampered.after_wait(|rings| rings.change(receiver(3), 0, |status| status - 16));
     let error = failed(&tampered, &mut accelerator);
-    let Fault::ShortPacket(at) = fault_of(&error) else { panic!("{error:?}") };
+    let Fault::Channel { cause: ChannelFault::ShortPacket, at } = fault_of(&error) else {
+        panic!("{error:?}")
+    };
     assert_eq!((at.channel.core, at.bytes_moved, at.bytes_expected), (3, 320, 336));
     assert_eq!(at.phase, Phase::Results);
     recovered(&mut accelerator, &error);
@@ -109,7 +112,9 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     let (_, tampered, mut accelerator) = Tampered::open();
     tampered.after_wait(|rings| rings.change(receiver(1), 0, |status| status & !RXEOF));
     let error = failed(&tampered, &mut accelerator);
-    assert!(matches!(fault_of(&error), Fault::NoPacketEnd(at) if at.channel.core == 1));
+    assert!(
+        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::NoPacketEnd, at } if at.channel.core == 1)
+    );
     recovered(&mut accelerator, &error);
 
     let (_, tampered, mut accelerator) = Tampered::open();
@@ -117,7 +122,10 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     // The board sent more than the buffers hold.
     tampered.tamper(1, S2MM + DMASR, Tamper::Set(1 << 4));
     let error = failed(&tampered, &mut accelerator);
-    assert!(matches!(fault_of(&error), Fault::LongPacket(at) if at.channel.core == 1), "{error:?}");
+    assert!(
+        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::LongPacket, at } if at.channel.core == 1),
+        "{error:?}"
+    );
     recovered(&mut accelerator, &error);
 }
 
@@ -126,7 +134,9 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
     let (_, tampered, mut accelerator) = Tampered::open();
     tampered.after_wait(|rings| rings.change(receiver(2), 0, |_| 0));
     let error = failed(&tampered, &mut accelerator);
-    assert!(matches!(fault_of(&error), Fault::StatusMissing(at) if at.channel.core == 2));
+    assert!(
+        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::StatusMissing, at } if at.channel.core == 2)
+    );
     recovered(&mut accelerator, &error);
 }
 

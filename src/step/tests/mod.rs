@@ -23,8 +23,8 @@ use self::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
 use crate::board::open::{BoardDescription, BoardKind, Found};
 use crate::platform::{Access, Platform};
 use crate::{
-    Accelerator, Aftermath, Awaited, BoardChoice, Body, Collision, Contact, Error, Fault,
-    OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
+    Accelerator, Aftermath, Awaited, BoardChoice, Body, ChannelFault, Collision, Contact, Error,
+    Fault, OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
 };
 
 pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
@@ -304,7 +304,9 @@ fn a_decode_error_on_any_channel_is_told_by_name_and_survived() {
     for core in 0..4 {
         for direction in BOTH {
             survives(Injected::new(FaultKind::DmaDecErr).on(core, direction), |fault| {
-                let Fault::DmaDecode(at) = fault else { return false };
+                let Fault::Channel { cause: ChannelFault::DmaDecode, at } = fault else {
+                    return false;
+                };
                 (at.channel.core, at.channel.direction) == (core, direction)
                     && at.descriptor.is_some_and(|descriptor| descriptor.status.failed())
             });

@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo bench --bench order
-//! cargo bench --bench order -- --grid 10x10x10 --steps 4 --json
+//! cargo bench --bench order -- --grid 10x10x10 --steps 4
 //! cargo bench --bench order -- --order hazard-free
 //! ```
 //!
@@ -25,7 +25,6 @@ use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use clap::Parser;
 use scene::{Scene, SceneOptions};
-use serde_json::json;
 use zynq_pgs::bench::CollisionPacker;
 use zynq_pgs::order::{Checker, InputBuffers, IssueWindow, Order, OrderReport, Ordered, Orderer};
 use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
@@ -74,20 +73,6 @@ impl Row {
             if self.first { "  (once, without memory of its own)" } else { "" },
         );
     }
-
-    fn to_json(&self) -> serde_json::Value {
-        json!({
-            "step": self.step,
-            "first": self.first,
-            "collisions": self.collisions,
-            "empty": self.empty,
-            "order_ms": milliseconds(self.order),
-            "verify_ms": milliseconds(self.verify),
-            "pack_in_order_ms": milliseconds(self.pack),
-            "pack_as_given_ms": milliseconds(self.pack_as_given),
-            "order_by_pack": self.ratio(),
-        })
-    }
 }
 
 /// The order, and the buffers that a step keeps for the next.
@@ -116,8 +101,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let (Pile { grid, drop, steps }, runs, json) =
-        (options.pile, options.common.runs(), options.common.json);
+    let (Pile { grid, drop, steps }, runs) = (options.pile, options.common.runs());
     let scene = SceneOptions { grid, drop, ..Default::default() };
     let mut scene = Scene::new(&scene)?;
     let emulated = EmulatedBoard::new(BoardConfig::default())?;
@@ -126,42 +110,18 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     accelerator.set_shapes(scene.shapes())?;
     let window = IssueWindow::of(accelerator.capabilities())?;
     let order = options.order.name();
-    if !json {
-        println!(
-            "{} cubes dropped from {} m, {order}, depth {} issue slots, medians of {} runs in turn\n",
-            grid,
-            drop,
-            window.depth(),
-            runs,
-        );
-        println!(" step collisions  empty     order    verify      pack      pack   order");
-        println!("                               ms        ms  in order  as given by pack");
-    }
+    println!(
+        "{grid} cubes dropped from {drop} m, {order}, depth {} issue slots, medians of {runs} runs in turn\n",
+        window.depth(),
+    );
+    println!(" step collisions  empty     order    verify      pack      pack   order");
+    println!("                               ms        ms  in order  as given by pack");
     let mut kept = Kept::new(options.order.without_hazards()?);
-    let mut rows = Vec::new();
     for step in 1..=steps {
         scene.detect();
-        let row = measure(step, runs, &scene, &mut kept, window)?;
-        if !json {
-            row.print();
-        }
-        rows.push(row);
+        measure(step, runs, &scene, &mut kept, window)?.print();
         let (bodies, collisions) = scene.parts_mut();
         accelerator.step(bodies, collisions, &StepParameters::default())?;
-    }
-    if json {
-        let rows: Vec<_> = rows.iter().map(Row::to_json).collect();
-        let document = json!({
-            "schema": 2,
-            "bench": "order",
-            "grid": grid.to_string(),
-            "drop_m": drop,
-            "order": order,
-            "depth": window.depth(),
-            "runs": runs,
-            "steps": rows,
-        });
-        println!("{document:#}");
     }
     Ok(())
 }

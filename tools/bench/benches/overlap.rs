@@ -3,7 +3,7 @@
 //! ```sh
 //! cargo bench --bench overlap
 //! cargo bench --bench overlap -- --input tests/golden/pile5_step60 --pack-ms 0.01
-//! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given --json
+//! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given
 //! ```
 //!
 //! The emulated board's clock advances with register accesses and waits; it stands still while this
@@ -13,9 +13,6 @@
 //! `--unpack-ms`. The step is always the same, of a standing scene or of a folder. The steps run
 //! one after the other (serial), and each packed while the one before it is on the board
 //! (overlapped).
-//!
-//! The output also has the host times of this machine, medians of steps without any time added: the
-//! cost of a step besides packing, ordering and waiting.
 
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
@@ -26,16 +23,15 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
+use bench::milliseconds;
 use bench::options::{Common, Pile, Sent};
 use bench::step::Step;
-use bench::{median, milliseconds};
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
 use clap::Parser;
 use scene::Grid;
-use serde_json::json;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, HostTimes, InFlight,
-    OpenOptions, Pose, StepParameters, StepReport, Velocity,
+    Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, InFlight, OpenOptions, Pose,
+    StepParameters, StepReport, Velocity,
 };
 
 /// Compares overlapping steps with the longer of packing and the board, on the board's clock.
@@ -153,19 +149,18 @@ impl Job<'_> {
     }
 
     /// Takes steps one after the other; returns the time of each on the board's clock, and the
-    /// reports.
+    /// report of the last one.
     fn serial(
         &self,
         accelerator: &mut Accelerator,
         steps: u32,
-    ) -> Result<(Duration, Vec<StepReport>), zynq_pgs::Error> {
+    ) -> Result<(Duration, StepReport), zynq_pgs::Error> {
         let begun = self.port.now();
-        let mut reports = Vec::new();
-        for _ in 0..steps {
-            let flight = self.submit(accelerator)?;
-            reports.push(flight.wait(&mut self.bodies())?);
+        let mut report = self.submit(accelerator)?.wait(&mut self.bodies())?;
+        for _ in 1..steps {
+            report = self.submit(accelerator)?.wait(&mut self.bodies())?;
         }
-        Ok(((self.port.now() - begun) / steps, reports))
+        Ok(((self.port.now() - begun) / steps, report))
     }
 
     /// Packs each step while the one before it is on the board; returns the time from the start of
@@ -174,36 +169,19 @@ impl Job<'_> {
         &self,
         accelerator: &mut Accelerator,
         steps: u32,
-    ) -> Result<(Duration, Vec<StepReport>), zynq_pgs::Error> {
+    ) -> Result<Duration, zynq_pgs::Error> {
         let mut flight = self.submit(accelerator)?;
         let begun = self.port.now();
-        let mut reports = Vec::new();
         for _ in 0..steps {
             let next = flight.prepare(&self.bodies(), &self.collisions(), &self.parameters)?;
             let (ended, started) = flight.wait_and_start(&mut self.bodies(), &next);
-            reports.push(ended?);
+            ended?;
             flight = started?;
         }
         let each = (self.port.now() - begun) / steps;
         flight.wait(&mut self.bodies())?;
-        Ok((each, reports))
+        Ok(each)
     }
-}
-
-/// Medians of host times, by phase.
-fn median_phases(reports: &[StepReport]) -> [(&'static str, Duration); 7] {
-    let of = |phase: fn(&HostTimes) -> Duration| {
-        median(reports.iter().map(|report| phase(&report.host)).collect())
-    };
-    [
-        ("validate", of(|host| host.validate)),
-        ("order", of(|host| host.order)),
-        ("pack", of(|host| host.pack)),
-        ("start", of(|host| host.start)),
-        ("wait", of(|host| host.wait)),
-        ("unpack", of(|host| host.unpack)),
-        ("commit", of(|host| host.commit)),
-    ]
 }
 
 fn main() -> ExitCode {
@@ -231,9 +209,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         port: emulated.cpu_port(),
     };
     // First without the assumed host times; the first step allocates all memory.
-    job.serial(&mut accelerator, 1)?;
-    let (_, plain) = job.serial(&mut accelerator, steps)?;
-    let alone = plain.first().ok_or("a report of each step")?;
+    let (_, alone) = job.serial(&mut accelerator, 2)?;
     let on_board = alone.modelled_time();
     job.pack = options.pack_ms;
     job.unpack = options.unpack_ms.unwrap_or_else(|| {
@@ -244,35 +220,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         options.pack_ms.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
     });
     let (serial, _) = job.serial(&mut accelerator, steps)?;
-    let (each, _) = job.overlapped(&mut accelerator, steps)?;
+    let each = job.overlapped(&mut accelerator, steps)?;
     let host = job.pack + job.unpack;
     let longer = host.max(on_board);
     let ratio = each.as_secs_f64() / longer.as_secs_f64();
     let ms = milliseconds;
-    let times = median_phases(&plain);
-    if options.common.json {
-        let host_ms: serde_json::Map<_, _> =
-            times.iter().map(|(name, time)| ((*name).to_owned(), ms(*time).into())).collect();
-        let document = json!({
-            "schema": 1,
-            "bench": "overlap",
-            "scene": name,
-            "order": options.order.name(),
-            "bodies": job.bodies.len(),
-            "collisions": job.collisions.len(),
-            "steps": steps,
-            "pack_ms": ms(job.pack),
-            "unpack_ms": ms(job.unpack),
-            "board_ms": ms(on_board),
-            "serial_ms": ms(serial),
-            "overlapped_ms": ms(each),
-            "overlapped_by_longer": ratio,
-            "serial_by_overlapped": serial.as_secs_f64() / each.as_secs_f64(),
-            "host_ms": host_ms,
-        });
-        println!("{document:#}");
-        return Ok(());
-    }
     println!(
         "{name}: {} bodies, {} collisions, {} steps, on the board's clock\n",
         job.bodies.len(),
@@ -291,9 +243,5 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     println!("board     {:>8.3} ms  {} cycles", ms(on_board), alone.cycles.total);
     println!("serial    {:>8.3} ms  a step", ms(serial));
     println!("overlapped{:>8.3} ms  a step, {ratio:.3} of the longer of the two", ms(each));
-    println!("\nthis host, medians");
-    for (name, time) in times {
-        println!("{name:<10}{:>8.3} ms", ms(time));
-    }
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! ```sh
 //! cargo bench --bench pack
 //! cargo bench --bench pack -- --input FOLDER --cpu-time
-//! cargo bench --bench pack -- --grid 10x10x10 --runs 31 --json
+//! cargo bench --bench pack -- --grid 10x10x10 --runs 31
 //! cargo bench --bench pack -- --profile half --thing in-order --order hazard-free
 //! cargo bench --bench pack -- --threads 2
 //! ```
@@ -19,8 +19,6 @@
 //! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the
 //!   one that is the default on a bitstream that does not wait, or `--order`, in the window of
 //!   `float`
-//! - `bare, ...`: the same collisions read, and the same number of bytes written to the same
-//!   channels, in the same loops but without making records: about the least that packing can take
 //! - `step, ...`: bodies, then collisions
 //! - `checked, ...`: the same with the validation of everything on the way, as a step does it
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
@@ -49,7 +47,6 @@ use bitstream_model::interface::profile::{FLOAT, HALF, Profile};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
-use serde_json::{Map, Value, json};
 use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
@@ -128,8 +125,6 @@ enum Thing {
     Bodies,
     AsGiven,
     InOrder,
-    BareAsGiven,
-    BareInOrder,
     StepAsGiven,
     StepInOrder,
     CheckedAsGiven,
@@ -141,7 +136,7 @@ enum Thing {
 impl Thing {
     /// Whether several threads share the work.
     const fn is_shared(self) -> bool {
-        !matches!(self, Self::BareAsGiven | Self::BareInOrder | Self::Commit)
+        !matches!(self, Self::Commit)
     }
 
     const fn name(self) -> &'static str {
@@ -149,8 +144,6 @@ impl Thing {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
             Self::InOrder => "in order",
-            Self::BareAsGiven => "bare, as given",
-            Self::BareInOrder => "bare, in order",
             Self::StepAsGiven => "step, as given",
             Self::StepInOrder => "step, in order",
             Self::CheckedAsGiven => "checked, as given",
@@ -193,19 +186,6 @@ impl Row {
         }
         println!();
     }
-
-    fn to_json(&self) -> Value {
-        json!({
-            "bytes": self.bytes,
-            "ms": milliseconds(self.time),
-            "gb_per_s": self.rate(self.time),
-            "memcpy_ms": milliseconds(self.copy),
-            "memcpy_gb_per_s": self.rate(self.copy),
-            "of_memcpy": ratio(self.copy, self.time),
-            "one_thread_ms": self.alone.map(milliseconds),
-            "times_as_fast_as_one_thread": self.alone.map(|alone| ratio(alone, self.time)),
-        })
-    }
 }
 
 fn main() -> ExitCode {
@@ -218,54 +198,25 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let schedule = step.schedule(BoardConfig::default(), options.order.without_hazards()?)?;
     let order = options.order.name();
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
-    if !options.common.json {
-        println!(
-            "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
-             stretches of {STRETCH} runs in turn, {clock}; {}\n",
-            step.name,
-            step.bodies.len(),
-            step.collisions.len(),
-            schedule.empty(),
-            options.common.runs(),
-            match options.threads {
-                1 => "one thread".to_owned(),
-                threads => format!("{threads} threads"),
-            },
-        );
-        print!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
-        if options.threads > 1 {
-            print!(" {:>8} {:>7}", "1 thread", "as fast");
-        }
-        println!();
+    println!(
+        "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
+         stretches of {STRETCH} runs in turn, {clock}; {} threads\n",
+        step.name,
+        step.bodies.len(),
+        step.collisions.len(),
+        schedule.empty(),
+        options.common.runs(),
+        options.threads,
+    );
+    print!("{:<27}{:>6} {:>8} {:>6} {:>15} {:>7}", "", "MB", "ms", "GB/s", "memcpy", "of it");
+    if options.threads > 1 {
+        print!(" {:>8} {:>7}", "1 thread", "as fast");
     }
-    let mut profiles = Vec::new();
+    println!();
     for profile in chosen {
-        let mut measured = Map::new();
         for thing in options.things() {
-            let row = measure(profile, thing, &step, &schedule, options)?;
-            if !options.common.json {
-                row.print();
-            }
-            measured.insert(thing.name().to_owned(), row.to_json());
+            measure(profile, thing, &step, &schedule, options)?.print();
         }
-        profiles.push(
-            json!({ "profile": profile.name, "threads": options.threads, "measured": measured }),
-        );
-    }
-    if options.common.json {
-        let document = json!({
-            "schema": 5,
-            "bench": "pack",
-            "step": step.name,
-            "bodies": step.bodies.len(),
-            "collisions": step.collisions.len(),
-            "order": order,
-            "empty": schedule.empty(),
-            "runs": options.common.runs(),
-            "clock": clock,
-            "profiles": profiles,
-        });
-        println!("{document:#}");
     }
     Ok(())
 }
@@ -306,8 +257,6 @@ fn measure(
             Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
             Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
             Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
-            Thing::BareAsGiven => (packer.deal_bare(collisions) > 0).then_some(0),
-            Thing::BareInOrder => (packer.deal_bare(&ordered) > 0).then_some(0),
             Thing::Bodies | Thing::Unpack | Thing::Commit => Some(0),
         }
         .ok_or("the step is refused, or has too few collisions")?;
@@ -316,8 +265,8 @@ fn measure(
     let [_, of_entries] = packers[0].bytes(bodies.len(), schedule.len());
     let bytes = match thing {
         Thing::Bodies => of_bodies,
-        Thing::AsGiven | Thing::BareAsGiven => of_collisions,
-        Thing::InOrder | Thing::BareInOrder => of_entries,
+        Thing::AsGiven => of_collisions,
+        Thing::InOrder => of_entries,
         Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
         Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
@@ -337,12 +286,6 @@ fn measure(
         Thing::Commit => contestants.push(Box::new(|| {
             unpackers[0].commit(&mut moved);
             black_box(&moved);
-        })),
-        Thing::BareAsGiven => contestants.push(Box::new(|| {
-            black_box(packers[0].deal_bare(black_box(collisions)));
-        })),
-        Thing::BareInOrder => contestants.push(Box::new(|| {
-            black_box(packers[0].deal_bare(black_box(&ordered)));
         })),
         _ => contestants
             .extend(packers.iter_mut().map(|packer| packing(thing, packer, step, &ordered))),
@@ -379,11 +322,7 @@ fn packing<'a>(
             Thing::CheckedInOrder => {
                 let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
             }
-            Thing::Bodies
-            | Thing::BareAsGiven
-            | Thing::BareInOrder
-            | Thing::Unpack
-            | Thing::Commit => {}
+            Thing::Bodies | Thing::Unpack | Thing::Commit => {}
         }
     })
 }

@@ -10,9 +10,6 @@ pub struct Common {
     /// Runs of each of the compared items, in turn; medians are shown
     #[arg(long, value_name = "N", default_value_t = 11, value_parser = clap::value_parser!(u16).range(1..))]
     runs: u16,
-    /// One JSON document, for programs
-    #[arg(long)]
-    pub json: bool,
     /// cargo adds this option.
     #[arg(long, hide = true)]
     bench: bool,

@@ -2,15 +2,13 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use scene::{Scene, SceneOptions};
 use step_folder::folder::Folder;
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer, Schedule};
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, Impulses, OpenOptions, Shape, StepParameters,
-    StepReport, WarmCollisions,
+    Accelerator, BoardChoice, Body, Collision, OpenOptions, Shape, StepParameters, StepReport,
 };
 
 use crate::options::Pile;
@@ -109,18 +107,7 @@ pub struct Emulated<'a> {
     step: &'a Step,
     accelerator: Accelerator,
     parameters: StepParameters,
-    /// The impulses that the step begins with, if it has a warm start.
-    impulses: Vec<Impulses>,
     bodies: Vec<Body>,
-}
-
-/// The measures of one step.
-#[derive(Debug, Clone, Copy)]
-pub struct Taken {
-    /// The driver's report.
-    pub report: StepReport,
-    /// Host time of the call.
-    pub call: Duration,
 }
 
 impl<'a> Emulated<'a> {
@@ -133,24 +120,7 @@ impl<'a> Emulated<'a> {
         let mut parameters = step.parameters;
         parameters.order = Some(Order::HazardFree);
         let accelerator = open(config, &step.shapes)?;
-        Ok(Self { step, accelerator, parameters, impulses: Vec::new(), bodies: Vec::new() })
-    }
-
-    /// Opens a board of this build for the step with each pair's friction and a warm start, whose
-    /// impulses come out again. It begins with a share of the impulses of the step without one.
-    ///
-    /// # Errors
-    ///
-    /// The board cannot be built, or the step without a warm start fails.
-    pub fn extended(step: &'a Step, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
-        const SHARE: f32 = 0.85;
-        let mut board = Self::new(step, config)?;
-        board.parameters.pair_friction = true;
-        board.parameters.impulses_out = true;
-        board.take()?;
-        board.impulses = board.accelerator.impulses().iter().map(|of| of.scaled(SHARE)).collect();
-        board.parameters.warm_start = true;
-        Ok(board)
+        Ok(Self { step, accelerator, parameters, bodies: Vec::new() })
     }
 
     /// Takes the step from its start.
@@ -158,17 +128,10 @@ impl<'a> Emulated<'a> {
     /// # Errors
     ///
     /// The step fails.
-    pub fn take(&mut self) -> Result<Taken, Box<dyn Error>> {
+    pub fn take(&mut self) -> Result<StepReport, Box<dyn Error>> {
         self.bodies.clone_from(&self.step.bodies);
-        let begin = Instant::now();
-        let (bodies, collisions) = (&mut self.bodies, &self.step.collisions);
-        let report = if self.parameters.warm_start {
-            let warm = WarmCollisions { collisions, impulses: &self.impulses };
-            self.accelerator.step(bodies, &warm, &self.parameters)?
-        } else {
-            self.accelerator.step(bodies, collisions, &self.parameters)?
-        };
-        Ok(Taken { report, call: begin.elapsed() })
+        let collisions = &self.step.collisions;
+        Ok(self.accelerator.step(&mut self.bodies, collisions, &self.parameters)?)
     }
 
     /// The bodies after the last step.

@@ -9,7 +9,6 @@ use bench::milliseconds;
 use bench::step::Emulated;
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::FLOAT;
-use serde_json::{Value, json};
 use step_trace::A53_COPIES;
 
 use crate::callgrind::{Only, count, is_there};
@@ -26,13 +25,13 @@ fn seconds(time: f64) -> Duration {
 
 pub(crate) fn measure(options: &Options) -> Outcome {
     if !is_there("a53") {
-        return Ok(Value::Null);
+        return Ok(());
     }
     let (instructions, _, packed) =
         count(options, Only::Pack, "*zynq_pgs::bench::CollisionPacker*pack*")?;
     let each = instructions / packed;
     let step = options.step()?;
-    let report = Emulated::new(&step, BoardConfig::default())?.take()?.report;
+    let report = Emulated::new(&step, BoardConfig::default())?.take()?;
     let words = FLOAT.default_variant().words();
     let bytes = |words: u32, records: u64| f64::from(words * u32::BITS / 8) * records as f64;
     let entries = report.collisions + report.empty;
@@ -47,53 +46,29 @@ pub(crate) fn measure(options: &Options) -> Outcome {
             (*cores, seconds((collisions + bodies) / rate), seconds(results / rate))
         })
         .collect();
-    if !options.common.json {
-        println!("A step on a Cortex-A53, on paper: {}", step.name);
+    println!("A step on a Cortex-A53, on paper: {}", step.name);
+    println!(
+        "  {:.2} MB of collisions and {:.2} MB of bodies are written, {:.2} MB of results read",
+        collisions / 1e6,
+        bodies / 1e6,
+        results / 1e6
+    );
+    let [one, two] = computing.map(milliseconds);
+    println!(
+        "  packing takes {each:.0} instructions a collision: {one:.1} ms at one a clock, {two:.1} at two"
+    );
+    println!("  the accelerator takes {:.2} ms at 12.8 GB/s (modelled)", milliseconds(device));
+    println!("  cores  writing  reading  one after the other  overlapped");
+    for (cores, write, read) in &rows {
+        let host = *write + *read;
         println!(
-            "  {:.2} MB of collisions and {:.2} MB of bodies are written, {:.2} MB of results read",
-            collisions / 1e6,
-            bodies / 1e6,
-            results / 1e6
+            "  {cores:>5} {:>8.2} {:>8.2} {:>20.2} {:>11.2}",
+            milliseconds(*write),
+            milliseconds(*read),
+            milliseconds(host + device),
+            milliseconds(host.max(device))
         );
-        let [one, two] = computing.map(milliseconds);
-        println!(
-            "  packing takes {each:.0} instructions a collision: {one:.1} ms at one a clock, {two:.1} at two"
-        );
-        println!("  the accelerator takes {:.2} ms at 12.8 GB/s (modelled)", milliseconds(device));
-        println!("  cores  writing  reading  one after the other  overlapped");
-        for (cores, write, read) in &rows {
-            let host = *write + *read;
-            println!(
-                "  {cores:>5} {:>8.2} {:>8.2} {:>20.2} {:>11.2}",
-                milliseconds(*write),
-                milliseconds(*read),
-                milliseconds(host + device),
-                milliseconds(host.max(device))
-            );
-        }
-        println!();
     }
-    let rows: Vec<Value> = rows
-        .iter()
-        .map(|(cores, write, read)| {
-            let host = *write + *read;
-            json!({
-                "cores": cores,
-                "write_ms": milliseconds(*write),
-                "read_ms": milliseconds(*read),
-                "one_after_the_other_ms": milliseconds(host + device),
-                "overlapped_ms": milliseconds(host.max(device)),
-            })
-        })
-        .collect();
-    Ok(json!({
-        "collision_bytes": collisions,
-        "body_bytes": bodies,
-        "result_bytes": results,
-        "instructions_per_collision": each,
-        "compute_ms_at_one_a_clock": milliseconds(computing[0]),
-        "compute_ms_at_two_a_clock": milliseconds(computing[1]),
-        "device_ms": milliseconds(device),
-        "copying": rows,
-    }))
+    println!();
+    Ok(())
 }

@@ -9,7 +9,6 @@ use bench::step::{Emulated, Step};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::ValueEnum;
-use serde_json::{Value, json};
 use yardstick::Yardstick;
 use zynq_pgs::StepParameters;
 use zynq_pgs::bench::CollisionPacker;
@@ -81,7 +80,7 @@ pub(crate) fn is_there(section: &str) -> bool {
 
 pub(crate) fn measure(options: &Options) -> Outcome {
     if !is_there("instructions") {
-        return Ok(Value::Null);
+        return Ok(());
     }
     let mut counts = Vec::new();
     for (function, passes) in COUNTED {
@@ -90,19 +89,12 @@ pub(crate) fn measure(options: &Options) -> Outcome {
         counts.push(instructions / (collisions * passes));
     }
     let [all, rows, contact, friction] = counts[..] else { return Err("a count for each".into()) };
-    if !options.common.json {
-        println!("Instructions of the yardstick, counted by callgrind");
-        println!(
-            "  {contact:.0} a pair and contact pass, {friction:.0} a pair and friction pass, {rows:.0} a \
-             pair for its rows: {all:.0} a pair and pass in all\n"
-        );
-    }
-    Ok(json!({
-        "per_pair_and_contact_pass": contact,
-        "per_pair_and_friction_pass": friction,
-        "per_pair_for_rows": rows,
-        "per_pair_and_pass_of_total": all,
-    }))
+    println!("Instructions of the yardstick, counted by callgrind");
+    println!(
+        "  {contact:.0} a pair and contact pass, {friction:.0} a pair and friction pass, {rows:.0} a \
+         pair for its rows: {all:.0} a pair and pass in all\n"
+    );
+    Ok(())
 }
 
 /// Instructions of a function, with the iterations of the step and its collisions.

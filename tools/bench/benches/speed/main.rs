@@ -1,9 +1,8 @@
-//! The emulated board beside a solver on the CPU; growth, memory, and an older `pgs`.
+//! The emulated board beside a solver on the CPU, and packing on a Cortex-A53, on paper.
 //!
 //! ```sh
 //! cargo bench --bench speed
-//! cargo bench --bench speed -- --section solver --input FOLDER --json
-//! cargo bench --bench speed -- --section old --old /usr/local/bin/pgs
+//! cargo bench --bench speed -- --section solver --input FOLDER
 //! ```
 //!
 //! The measured step is of the thesis' cubes, standing on the ground and stepped on the emulated
@@ -16,11 +15,7 @@
 
 mod a53;
 mod callgrind;
-mod growth;
-mod process;
-mod profiles;
 mod solver;
-mod world;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -30,26 +25,19 @@ use bench::options::{Common, Pile};
 use bench::step::Step;
 use bitstream_model::BoardConfig;
 use clap::{Parser, ValueEnum};
-use serde_json::{Map, Value, json};
 
 /// Compares the emulated board with a solver on the CPU.
 #[derive(Debug, Parser)]
 #[command(name = "cargo bench --bench speed --")]
 struct Options {
-    /// Section to measure [default: all but `old`]
+    /// Section to measure [default: all]
     #[arg(long, value_enum)]
-    section: Vec<Section>,
+    section: Option<Section>,
     /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
     #[command(flatten)]
     pile: Pile,
-    /// An older `pgs`, which runs the thesis' scene beside this one
-    #[arg(long, value_name = "BINARY")]
-    old: Option<PathBuf>,
-    /// Steps of each run of the thesis' scene
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
-    run_steps: u32,
     /// Run this item only, for a tool that counts.
     #[arg(long, value_enum, hide = true)]
     only: Option<callgrind::Only>,
@@ -62,32 +50,15 @@ struct Options {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Section {
-    /// Time of a step beside the yardstick, and the driver's share of it
+    /// Time of a step beside the yardstick
     Solver,
-    /// Time of a step in each design, without short cuts and by default
-    Profiles,
-    /// Time of a step with world inertia, warm start and pair friction beside one without
-    World,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
     /// Cost of packing on a Cortex-A53, on paper (docs/a53-cost.md)
     A53,
-    /// Time per collision from small scenes to large ones
-    Growth,
-    /// Peak memory of `pgs run`
-    Memory,
-    /// Time of `pgs run` beside an older one (`--old`)
-    Old,
 }
 
 impl Options {
-    fn has(&self, section: Section) -> bool {
-        match self.section.is_empty() {
-            true => section != Section::Old || self.old.is_some(),
-            false => self.section.contains(&section),
-        }
-    }
-
     fn step(&self) -> Result<Step, Box<dyn Error>> {
         match &self.input {
             Some(folder) => Step::load(folder),
@@ -96,41 +67,26 @@ impl Options {
     }
 }
 
-/// The JSON of a section; its text is printed during the measurement.
-type Outcome = Result<Value, Box<dyn Error>>;
-
-/// Measures a section.
-type Measure = fn(&Options) -> Outcome;
+/// A section prints its figures.
+type Outcome = Result<(), Box<dyn Error>>;
 
 fn main() -> ExitCode {
     bench::exit_code(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     if let Some(only) = options.only {
         return callgrind::run(only, options.profile.as_deref(), &options.step()?);
     }
-    let mut document = Map::new();
-    document.insert("schema".to_owned(), 1.into());
-    document.insert("bench".to_owned(), "speed".into());
-    document.insert("runs".to_owned(), options.common.runs().into());
-    let sections: [(Section, &str, Measure); 8] = [
-        (Section::Solver, "solver", solver::measure),
-        (Section::Profiles, "profiles", profiles::measure),
-        (Section::World, "world", world::measure),
-        (Section::Instructions, "instructions", callgrind::measure),
-        (Section::A53, "a53", a53::measure),
-        (Section::Growth, "growth", growth::measure),
-        (Section::Memory, "memory", process::memory),
-        (Section::Old, "old", process::old),
+    let sections: [(Section, fn(&Options) -> Outcome); 3] = [
+        (Section::Solver, solver::measure),
+        (Section::Instructions, callgrind::measure),
+        (Section::A53, a53::measure),
     ];
-    for (section, name, measure) in sections {
-        if options.has(section) {
-            document.insert(name.to_owned(), measure(options)?);
+    for (section, measure) in sections {
+        if options.section.is_none_or(|wanted| wanted == section) {
+            measure(options)?;
         }
-    }
-    if options.common.json {
-        println!("{:#}", json!(document));
     }
     Ok(())
 }
