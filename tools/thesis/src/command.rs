@@ -162,7 +162,7 @@ impl ThesisArgs {
 /// Writes the list of experiments.
 fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
     let columns = [("name", "name"), ("thesis", "thesis"), ("about", "")];
-    let mut table = Table::new("experiments", "Experiments", &columns);
+    let mut table = Table::with_columns("experiments", "Experiments", &columns);
     for experiment in experiments() {
         table.row([text(experiment.id()), text(experiment.thesis()), text(experiment.about())]);
     }

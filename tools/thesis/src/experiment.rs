@@ -145,7 +145,7 @@ impl Part {
     fn index(&self) -> Option<Table> {
         let columns =
             [("thesis", "thesis"), ("subject", ""), ("recorded", "its figure"), ("ours", "ours")];
-        let mut table = Table::new("index", "Beside the thesis", &columns);
+        let mut table = Table::with_columns("index", "Beside the thesis", &columns);
         for Row { thesis, subject, recorded, ours, .. } in &self.rows {
             table.row([thesis, subject, recorded, ours].map(text));
         }

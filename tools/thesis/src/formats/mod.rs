@@ -141,7 +141,7 @@ fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<Step>, Failur
 
 /// The numbers of each kind and of each sum.
 fn of_kinds(kinds: &[Numbers]) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "numbers",
         "The numbers of a step, and their errors in 16 bits",
         &[
@@ -198,7 +198,7 @@ fn cells<'a>(name: &str, values: impl Iterator<Item = &'a f32> + Clone) -> Vec<C
 /// The numbers as streamed, by powers of ten.
 fn by_size(kinds: &[Numbers]) -> Table {
     let columns = [("from", "from"), ("numbers", "numbers"), ("percent", "%")];
-    let mut table = Table::new("sizes", format!("{} by size", AS_STREAMED.name), &columns);
+    let mut table = Table::with_columns("sizes", format!("{} by size", AS_STREAMED.name), &columns);
     let sizes = Sizes::of(AS_STREAMED.of(kinds));
     let percent = |part: u64| 100.0 * part as f64 / sizes.numbers.max(1) as f64;
     let zeros = std::iter::once(("0".to_owned(), sizes.zeros));

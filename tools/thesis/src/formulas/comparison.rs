@@ -22,7 +22,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 }
 
 fn platforms() -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "platforms",
         "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
         &[
@@ -187,7 +187,7 @@ const FIGURES: [Figure; 13] = [
 ];
 
 fn against(scene: &Scene) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "comparison",
         "Against the thesis' GPU and CPU (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)",
         &[

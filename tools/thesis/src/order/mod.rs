@@ -130,40 +130,27 @@ fn refused(error: OrderError) -> Failure {
 }
 
 fn table(measured: &Rows) -> Table {
-    let mut table = Table::new(
-        "orders",
-        "The cost of each order",
-        &[
-            ("order", "order"),
-            ("depth", "depth\nslots"),
-            ("hazards", "hazards"),
-            ("hazard_percent", "hazards\n%"),
-            ("lost_updates", "lost\nupdates"),
-            ("empty", "empty\nslots"),
-            ("empty_percent", "empty\n%"),
-            ("slots", "slots"),
-            ("most_alive", "alive\nmost"),
-            ("longest_span", "span\nlongest"),
-            ("mean_span", "span\nmean"),
-            ("host_ns_per_collision", "host\nns/coll."),
-        ],
-    );
+    let mut table = Table::new("orders", "The cost of each order");
     let count = |number: usize| Cell::Whole(number as u64);
     for row in &measured.rows {
         let report = &row.report;
         table.row([
-            text(&row.order),
-            Cell::Whole(row.depth.into()),
-            count(report.hazards),
-            Cell::Number(report.hazard_share() * 100.0, 2),
-            count(report.lost_updates),
-            count(report.empty),
-            Cell::Number(report.empty_share() * 100.0, 3),
-            count(report.slots),
-            count(report.most_alive),
-            count(report.longest_span),
-            Cell::Number(report.mean_span, 0),
-            Cell::known(row.host_ns, |ns| Cell::Number(ns, 1)),
+            ("order", "order", text(&row.order)),
+            ("depth", "depth\nslots", Cell::Whole(row.depth.into())),
+            ("hazards", "hazards", count(report.hazards)),
+            ("hazard_percent", "hazards\n%", Cell::Number(report.hazard_share() * 100.0, 2)),
+            ("lost_updates", "lost\nupdates", count(report.lost_updates)),
+            ("empty", "empty\nslots", count(report.empty)),
+            ("empty_percent", "empty\n%", Cell::Number(report.empty_share() * 100.0, 3)),
+            ("slots", "slots", count(report.slots)),
+            ("most_alive", "alive\nmost", count(report.most_alive)),
+            ("longest_span", "span\nlongest", count(report.longest_span)),
+            ("mean_span", "span\nmean", Cell::Number(report.mean_span, 0)),
+            (
+                "host_ns_per_collision",
+                "host\nns/coll.",
+                Cell::known(row.host_ns, |ns| Cell::Number(ns, 1)),
+            ),
         ]);
     }
     table

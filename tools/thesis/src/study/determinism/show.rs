@@ -149,7 +149,7 @@ impl Outcome {
     }
 
     fn steps(&self) -> Table {
-        let mut table = Table::new(
+        let mut table = Table::with_columns(
             "orders",
             "Deviation of one order from another, step by step",
             &[
@@ -209,15 +209,8 @@ impl Outcome {
         if histograms.iter().all(|histogram| histogram.is_none()) {
             return None;
         }
-        let mut table = Table::new(
-            "decades",
-            "Positions after the last step by deviation, % of them",
-            &[
-                ("from_percent", "from %"),
-                ("gpu_percent", "gpu, as-given"),
-                ("pairs_percent", "random pairs"),
-            ],
-        );
+        let mut table =
+            Table::new("decades", "Positions after the last step by deviation, % of them");
         let [gpu, random] = histograms
             .map(|histogram| histogram.as_ref().map(Histogram::decades).unwrap_or_default());
         for row in 0..gpu.len().max(random.len()) {
@@ -229,7 +222,11 @@ impl Outcome {
             let edge = both.iter().flatten().next().map_or(0.0, |(edge, _)| *edge);
             let share = |share| Cell::known(share, |share: f64| Cell::Number(share * 100.0, 4));
             let edge = if row == 0 { text("less") } else { text(format!("{edge:.0e}")) };
-            table.row([edge, share(shares[0]), share(shares[1])]);
+            table.row([
+                ("from_percent", "from %", edge),
+                ("gpu_percent", "gpu, as-given", share(shares[0])),
+                ("pairs_percent", "random pairs", share(shares[1])),
+            ]);
         }
         Some(table)
     }

@@ -12,31 +12,24 @@ use pgs_command::numbers::{grouped, number};
 /// A table of the residuals after some passes; `heads` are of the passes and of the third residual.
 fn residuals(
     (id, title): (&'static str, &str),
-    [passes_head, third]: [&'static str; 2],
+    [passes_head, third_head]: [&'static str; 2],
     passes: &[Pass],
     of: impl Fn(&Residuals) -> [f64; 3],
 ) -> Table {
-    let mut table = Table::new(
-        id,
-        title,
-        &[
-            ("passes", passes_head),
-            ("rms_m_s", "residual\nrms m/s"),
-            ("largest_m_s", "largest\nm/s"),
-            ("third_rms_m_s", third),
-            ("largest_change_n_s", "change\nN s"),
-            ("largest_share", "share"),
-        ],
-    );
+    let mut table = Table::new(id, title);
     for pass in shown(passes) {
         let [rms, largest, third] = of(&pass.residuals).map(Cell::Digits);
         table.row([
-            Cell::Whole(pass.passes.into()),
-            rms,
-            largest,
-            third,
-            Cell::known(pass.largest_change_n_s, Cell::Digits),
-            Cell::known(pass.largest_share, Cell::Digits),
+            ("passes", passes_head, Cell::Whole(pass.passes.into())),
+            ("rms_m_s", "residual\nrms m/s", rms),
+            ("largest_m_s", "largest\nm/s", largest),
+            ("third_rms_m_s", third_head, third),
+            (
+                "largest_change_n_s",
+                "change\nN s",
+                Cell::known(pass.largest_change_n_s, Cell::Digits),
+            ),
+            ("largest_share", "share", Cell::known(pass.largest_share, Cell::Digits)),
         ]);
     }
     table
@@ -132,7 +125,7 @@ impl Outcome {
     }
 
     fn rules(&self) -> Table {
-        let mut table = Table::new(
+        let mut table = Table::with_columns(
             "rules",
             "Passes until a rule holds",
             &[
