@@ -36,15 +36,15 @@ Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fail
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
-    #[command(flatten)]
-    pub(crate) board: BoardOptions,
-    #[command(flatten)]
-    pub(crate) accelerator: AcceleratorOptions,
     /// Build the emulated board with a defect, to see how the test reports it
     #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
     quirk: Option<QuirkName>,
     #[command(flatten)]
     build: BuildArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// A defect of the emulated board.

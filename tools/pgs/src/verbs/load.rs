@@ -32,8 +32,6 @@ rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {
-    #[command(flatten)]
-    pub(crate) manager: ManagerOptions,
     /// Bitstream in bootgen's format (.bit.bin).
     file: PathBuf,
     /// Compiled overlay, applied after the bitstream is loaded.
@@ -59,6 +57,8 @@ pub(crate) struct LoadArgs {
     /// Directory that holds the system's files, for tests.
     #[arg(long, hide = true, default_value = "/")]
     system_root: PathBuf,
+    #[command(flatten)]
+    pub(crate) manager: ManagerOptions,
 }
 
 /// The failure of a bitstream that is not loaded.

@@ -38,8 +38,6 @@ ends the server and removes the socket.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
-    #[command(flatten)]
-    pub(crate) accelerator: AcceleratorOptions,
     /// Unix socket to create; who may write to it may drive the board.
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: PathBuf,
@@ -55,6 +53,8 @@ pub(crate) struct ServeArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// Counts over all drivers.

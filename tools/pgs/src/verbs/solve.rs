@@ -77,10 +77,6 @@ terms, motion. Poses stay unchanged.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct SolveArgs {
-    #[command(flatten)]
-    pub(crate) board: BoardOptions,
-    #[command(flatten)]
-    pub(crate) accelerator: AcceleratorOptions,
     /// Folder of .npy arrays.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
@@ -112,6 +108,10 @@ pub(crate) struct SolveArgs {
     planned: PlannedArgs,
     #[command(flatten)]
     traced: TracedArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 impl SolveArgs {

@@ -48,14 +48,14 @@ A cell is one fault at one place. It passes if the fault happened, and
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
-    #[command(flatten)]
-    pub(crate) accelerator: AcceleratorOptions,
     /// Try this profile only.
     #[arg(long, value_name = "PROFILE", value_parser = pgs_command::options::build::profile())]
     profile: Option<&'static Profile>,
     /// Print the fault of each cell, and try none.
     #[arg(long)]
     list: bool,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// The results of a profile's cells.

@@ -30,11 +30,11 @@ uses it.";
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {
-    #[command(flatten)]
-    pub(crate) board: BoardOptions,
     /// Directory that holds the system's files, for tests.
     #[arg(long, hide = true, default_value = "/")]
     system_root: PathBuf,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
 }
 
 /// Lists the boards.

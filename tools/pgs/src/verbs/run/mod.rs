@@ -80,10 +80,6 @@ const ROWS: u32 = 15;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = MORE, after_long_help = EXAMPLES)]
 pub(crate) struct RunArgs {
-    #[command(flatten)]
-    pub(crate) board: BoardOptions,
-    #[command(flatten)]
-    pub(crate) accelerator: AcceleratorOptions,
     /// Steps to take [default: 120 for cubes, 600 for shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
@@ -115,6 +111,10 @@ pub(crate) struct RunArgs {
     ordering: OrderingArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     #[command(flatten)]
     faults: FaultArgs,
     #[command(flatten)]
