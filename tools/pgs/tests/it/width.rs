@@ -10,6 +10,8 @@ fn on_terminal(columns: usize, arguments: &str) -> Vec<String> {
     let command = format!("stty rows 24 cols {columns}; exec '{pgs}' {arguments}");
     let mut script = Command::new("script");
     script.args(["-qec", &command, "/dev/null"]).env("RUST_LOG", "error");
+    // Words in bold would have more characters than columns.
+    script.env("NO_COLOR", "1");
     let ran: Ran = script.stdin(Stdio::null()).output().expect("script runs").into();
     ran.stdout.lines().map(|line| line.trim_end_matches('\r').to_owned()).collect()
 }
