@@ -31,7 +31,7 @@ impl OrderInput<'_> {
     }
 
     /// The collisions with contact points: index and pair.
-    pub(super) fn taking_part(&self) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
+    pub fn taking_part(&self) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
         (0..).zip(self.pairs.iter().copied()).filter(|(_, pair)| Self::takes_part(*pair))
     }
 

@@ -39,9 +39,7 @@
 //!
 //! Source: thesis §4.7 and §5.4.4; interface specification, hazards.
 
-mod body_by_body;
 mod check;
-mod colours;
 mod error;
 mod groups;
 mod input;
@@ -53,12 +51,12 @@ mod sweep;
 mod tail;
 mod window;
 
-pub use crate::scene::{Order, Ties};
+pub use crate::scene::Order;
 pub use check::Checker;
 pub use error::OrderError;
 pub use input::{InputBuffers, OrderInput};
 pub(crate) use interlock::Interlock;
-pub use orderer::{OrderCosts, Orderer, colour_count};
+pub use orderer::{OrderCosts, Orderer};
 pub use report::{OrderReport, live_curve};
 pub use schedule::{Ordered, Schedule};
 pub use window::IssueWindow;

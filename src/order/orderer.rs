@@ -7,7 +7,7 @@ use super::interlock::{Interlock, StallCounter};
 use super::schedule::EMPTY;
 use super::sweep::Sweep;
 use super::tail::Tail;
-use super::{IssueWindow, Order, OrderError, OrderInput, Schedule, body_by_body, colours};
+use super::{IssueWindow, Order, OrderError, OrderInput, Schedule};
 
 /// Makes orders, and keeps its memory from one to the next. For [`Order::AsGiven`] and the orders
 /// without hazards it allocates nothing once it has [made](Self::made) the same order of a scene of
@@ -86,10 +86,6 @@ impl Orderer {
         let mut made = order;
         match order {
             Order::AsGiven => as_given(input, schedule),
-            Order::BodyByBody(ties) => body_by_body::order(input, ties, schedule),
-            Order::Colours => {
-                colours::order(input, schedule);
-            }
             Order::HazardFree => {
                 self.sweep.run(input);
                 self.place(window, self.limit)?;
@@ -247,13 +243,4 @@ pub struct OrderCosts {
 /// One part in a hundred more: another order must save at least this much.
 const fn one_percent_more(cycles: u64) -> u64 {
     cycles.saturating_add(cycles / 100)
-}
-
-/// Number of colours of [`Order::Colours`].
-///
-/// # Errors
-/// [`OrderError`], as [`Orderer::order`].
-pub fn colour_count(input: &OrderInput<'_>) -> Result<usize, OrderError> {
-    input.check()?;
-    Ok(colours::order(input, &mut Schedule::default()))
 }

@@ -17,7 +17,7 @@ pub use collision::{CONTACT_POINTS, Collision, Contact};
 pub use collisions::{CollisionArrays, Collisions, WarmCollisions};
 pub use contact_memory::ContactMemory;
 pub use impulses::Impulses;
-pub use order::{Order, Ties};
+pub use order::Order;
 pub use parameters::StepParameters;
 pub(crate) use passes::Passes;
 pub use shape::{Shape, ShapeError};

@@ -11,11 +11,6 @@ pub enum Order {
     /// caller asks for this order, the board gets an empty collision as padding, which takes its
     /// place among the others.
     AsGiven,
-    /// Body by body, as the thesis proposes (§4.7): few bodies alive, nearly every use a hazard.
-    BodyByBody(Ties),
-    /// By colour, no body twice in a colour: no hazards if colours are large, but nearly all bodies
-    /// alive at once.
-    Colours,
     /// No hazards at all and few bodies alive: swept along the longest axis of the scene, with uses
     /// of a body a whole depth apart and empty entries where nothing fits.
     HazardFree,
@@ -37,15 +32,4 @@ impl Order {
     pub const fn is_hazard_free(self) -> bool {
         matches!(self, Self::HazardFree | Self::HazardFreeNearby)
     }
-}
-
-/// The rule that picks one of several active bodies with the fewest collisions left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ties {
-    /// The body of the lowest index.
-    LowestIndex,
-    /// The body that became active first.
-    Oldest,
-    /// The body that became active last.
-    Newest,
 }

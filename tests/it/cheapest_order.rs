@@ -219,8 +219,8 @@ fn the_report_says_why_an_order_was_taken() {
         (Order::HazardFreeNearby, OrderChoice::NoInterlock)
     );
     assert!(report.empty > 0 && report.hazards == 0);
-    let report = choice(BoardConfig::default(), &ordered(Order::Colours));
-    assert_eq!((report.order, report.order_choice), (Order::Colours, OrderChoice::Asked));
+    let report = choice(BoardConfig::default(), &ordered(Order::HazardFree));
+    assert_eq!((report.order, report.order_choice), (Order::HazardFree, OrderChoice::Asked));
     // An order without hazards can be verified.
     let mut verified = none;
     verified.verify_order = true;

@@ -44,7 +44,7 @@ fi
 
 attend cargo build --quiet --release --locked -p pgs -p guest-board
 # The expected digest is the model's, whatever the accelerator.
-digest=$("$host/pgs" --board emulated --accelerator model run --grid 5x5x5 --steps "$steps" \
+digest=$("$host/pgs" run --board emulated --accelerator model --grid 5x5x5 --steps "$steps" \
 	--subnormals $subnormals |
 	sed -n 's/^digest  *fnv1a-64 \([0-9a-f]\{16\}\)$/\1/p')
 [ -n "$digest" ] || fail "the run on this machine gave no digest"

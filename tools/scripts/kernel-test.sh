@@ -15,7 +15,7 @@ cd "$repository"
 
 # What the same run ends with on this machine.
 attend cargo build --quiet --release --locked -p pgs
-digest=$("${CARGO_TARGET_DIR:-target}/release/pgs" --board emulated run --grid 5x5x5 --steps 120 --json |
+digest=$("${CARGO_TARGET_DIR:-target}/release/pgs" run --board emulated --grid 5x5x5 --steps 120 --json |
 	sed -n 's/.*"value": "\([0-9a-f]\{16\}\)".*/\1/p')
 [ -n "$digest" ] || fail "the run on this machine gave no digest"
 

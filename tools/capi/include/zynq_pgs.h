@@ -71,14 +71,6 @@ typedef enum zpgs_order {
     ZPGS_ORDER_HAZARD_FREE_NEARBY = 2,
     // No hazards and few bodies alive.
     ZPGS_ORDER_HAZARD_FREE = 3,
-    // By colour, no body twice in a colour.
-    ZPGS_ORDER_COLOURS = 4,
-    // Body by body; of equal bodies the one of the lowest index.
-    ZPGS_ORDER_BODY_BY_BODY_LOWEST_INDEX = 5,
-    // Body by body; of equal bodies the one that became active first.
-    ZPGS_ORDER_BODY_BY_BODY_OLDEST = 6,
-    // Body by body; of equal bodies the one that became active last.
-    ZPGS_ORDER_BODY_BY_BODY_NEWEST = 7,
 } zpgs_order;
 
 // An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.

@@ -19,27 +19,34 @@ pub enum Order {
     HazardFreeNearby = 2,
     /// No hazards and few bodies alive.
     HazardFree = 3,
-    /// By colour, no body twice in a colour.
-    Colours = 4,
-    /// Body by body; of equal bodies the one of the lowest index.
-    BodyByBodyLowestIndex = 5,
-    /// Body by body; of equal bodies the one that became active first.
-    BodyByBodyOldest = 6,
-    /// Body by body; of equal bodies the one that became active last.
-    BodyByBodyNewest = 7,
 }
 
 impl Order {
-    const ALL: [Self; 8] = [
-        Self::Automatic,
-        Self::AsGiven,
-        Self::HazardFreeNearby,
-        Self::HazardFree,
-        Self::Colours,
-        Self::BodyByBodyLowestIndex,
-        Self::BodyByBodyOldest,
-        Self::BodyByBodyNewest,
+    const ALL: [Self; 4] =
+        [Self::Automatic, Self::AsGiven, Self::HazardFreeNearby, Self::HazardFree];
+
+    /// Orders that earlier headers had; their numbers are not given again.
+    const REMOVED: [(u32, &str); 4] = [
+        (4, "ZPGS_ORDER_COLOURS"),
+        (5, "ZPGS_ORDER_BODY_BY_BODY_LOWEST_INDEX"),
+        (6, "ZPGS_ORDER_BODY_BY_BODY_OLDEST"),
+        (7, "ZPGS_ORDER_BODY_BY_BODY_NEWEST"),
     ];
+
+    /// The order of a number of C.
+    fn of(number: u32) -> Result<Self, Failure> {
+        let known = Self::ALL.into_iter().find(|order| *order as u32 == number);
+        let removed = || Self::REMOVED.into_iter().find(|(removed, _)| *removed == number);
+        known.ok_or_else(|| {
+            Failure::argument(match removed() {
+                Some((_, name)) => format!(
+                    "found {number} as the order: {name} is no more, give the collisions in this order \
+                     and ZPGS_ORDER_AS_GIVEN"
+                ),
+                None => format!("found {number} as the order: give a value of zpgs_order"),
+            })
+        })
+    }
 
     /// The driver's order; `None` is the cheapest.
     fn driver(self) -> Option<order::Order> {
@@ -48,10 +55,6 @@ impl Order {
             Self::AsGiven => Some(order::Order::AsGiven),
             Self::HazardFreeNearby => Some(order::Order::HazardFreeNearby),
             Self::HazardFree => Some(order::Order::HazardFree),
-            Self::Colours => Some(order::Order::Colours),
-            Self::BodyByBodyLowestIndex => Some(order::Order::BodyByBody(order::Ties::LowestIndex)),
-            Self::BodyByBodyOldest => Some(order::Order::BodyByBody(order::Ties::Oldest)),
-            Self::BodyByBodyNewest => Some(order::Order::BodyByBody(order::Ties::Newest)),
         }
     }
 }
@@ -134,13 +137,7 @@ impl Parameters {
     /// The parameters as the driver has them.
     pub(crate) fn driver(&self) -> Result<StepParameters, Failure> {
         let given = self;
-        let order = Order::ALL.into_iter().find(|order| *order as u32 == given.order);
-        let order = order.ok_or_else(|| {
-            Failure::argument(format!(
-                "found {} as the order: give a value of zpgs_order",
-                given.order
-            ))
-        })?;
+        let order = Order::of(given.order)?;
         let deadline = Duration::from_millis(given.deadline_ms.into());
         Ok(StepParameters::default()
             .with_time_step(given.time_step)
@@ -231,6 +228,11 @@ mod tests {
     fn an_unknown_order_or_flag_is_refused_by_name() {
         let order = Parameters { order: 8, ..Parameters::default() }.driver().expect_err("refused");
         assert!(order.text.contains("found 8 as the order"), "{}", order.text);
+        for (order, name) in Order::REMOVED {
+            let refused = Parameters { order, ..Parameters::default() }.driver();
+            let said = refused.expect_err("removed").text;
+            assert!(said.contains(name) && said.contains("ZPGS_ORDER_AS_GIVEN"), "{said}");
+        }
         let flag = Parameters { kinematic: 2, ..Parameters::default() }.driver();
         assert!(flag.expect_err("refused").text.contains("the flag kinematic"));
     }

@@ -1,4 +1,5 @@
-//! Options of every verb: output, board, DMA memory, FPGA manager.
+//! Options that verbs share: output, and for verbs that open a board: the board, DMA memory, FPGA manager,
+//! accelerator.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -9,21 +10,30 @@ use zynq_pgs::{BoardChoice, BoardTextError, ManagerChoice, MemoryChoice};
 use crate::environment::{BOARD, MANAGER, MEMORY, RTL, is_blank};
 use crate::options::memory::memory_choice;
 
-/// The options of every verb, as parsed.
-#[derive(Debug, Clone, Args)]
+/// The option of every verb, as parsed.
+#[derive(Debug, Clone, Copy, Args)]
 pub struct CommonOptions {
     /// Print one JSON document instead of text.
     #[arg(long, global = true)]
-    json: bool,
+    pub json: bool,
+}
+
+/// The heading of the options of a board.
+const HEADING: &str = "Board";
+
+/// The options of a verb that opens a board of any kind.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = HEADING)]
+pub struct BoardOptions {
     /// Board to use.
     #[arg(
-        help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), uio[:NODE] \
-                (the UIO node of that name, or NODE-control, NODE-dma0 ... for each region), devmem \
-                (registers through /dev/mem, at the addresses of the interface; needs root), \
-                emulated or socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] \
-                [default: auto]",
+        help = "Board to use: auto, uio[:NODE], devmem, emulated, socket:PATH",
+        long_help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), \
+                     uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for each \
+                     region), devmem (registers through /dev/mem, at the addresses of the interface; \
+                     needs root), emulated or socket:PATH (one that `pgs serve` serves) [env: \
+                     PGS_BOARD] [default: auto]",
         long,
-        global = true,
         value_name = "BOARD",
         value_parser = board_name
     )]
@@ -34,11 +44,18 @@ pub struct CommonOptions {
                 \"pgs-memory\"), u-dma-buf[:NAME[:write-combining]], uio[:NODE] or \
                 devmem[:ADDRESS+BYTES] [env: PGS_MEMORY] [default: auto]",
         long,
-        global = true,
         value_name = "MEMORY",
         value_parser = memory_choice
     )]
     memory: Option<MemoryChoice>,
+    #[command(flatten)]
+    manager: ManagerOptions,
+}
+
+/// The option of a verb that asks the FPGA manager.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = HEADING)]
+pub struct ManagerOptions {
     /// FPGA manager of a real board's logic.
     #[arg(
         help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
@@ -46,11 +63,16 @@ pub struct CommonOptions {
                 that the kernel did not load, for example by JTAG. WARNING: an access to logic that \
                 is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
         long,
-        global = true,
         value_name = "MANAGER",
         value_parser = manager_choice
     )]
     manager: Option<ManagerChoice>,
+}
+
+/// The option of a verb that may build an emulated board.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = HEADING)]
+pub struct AcceleratorOptions {
     /// Accelerator of an emulated board.
     #[arg(
         help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
@@ -58,11 +80,29 @@ pub struct CommonOptions {
                 beside it on the same beats, up to the first difference [env: PGS_RTL, the PATH of \
                 rtl] [default: model]",
         long,
-        global = true,
         value_name = "ACCELERATOR",
         value_parser = accelerator_choice
     )]
     accelerator: Option<AcceleratorChoice>,
+}
+
+/// The options of a board that a verb has. The environment is read for these only: a wrong variable
+/// breaks no command that does not use it.
+#[derive(Debug, Clone, Default)]
+pub struct Given {
+    /// Of a verb that opens a board of any kind.
+    pub board: Option<BoardOptions>,
+    /// Of a verb that asks the FPGA manager, and opens no board.
+    pub manager: Option<ManagerOptions>,
+    /// Of a verb that may build an emulated board.
+    pub accelerator: Option<AcceleratorOptions>,
+}
+
+impl Given {
+    /// Whether the verb builds all of its boards itself.
+    const fn builds_boards(&self) -> bool {
+        self.board.is_none() && self.accelerator.is_some()
+    }
 }
 
 /// The accelerator of an emulated board.
@@ -174,18 +214,6 @@ fn manager_choice(text: &str) -> Result<ManagerChoice, String> {
     }
 }
 
-/// The common options that a verb reads. The environment is read for these only: a wrong variable
-/// breaks no command that does not use it.
-#[derive(Debug, Clone, Copy)]
-pub struct Reads {
-    /// Whether a board is opened.
-    pub board: bool,
-    /// Whether the FPGA manager is asked.
-    pub manager: bool,
-    /// Whether the accelerator of an emulated board can be chosen.
-    pub accelerator: bool,
-}
-
 impl CommonArgs {
     /// The options of a command on the emulated board, with text.
     #[must_use]
@@ -209,46 +237,53 @@ impl CommonOptions {
     /// Fails where a variable has a wrong value, or an option has no effect.
     pub fn complete(
         self,
-        reads: Reads,
+        given: Given,
         variable: impl Fn(&str) -> Option<OsString>,
     ) -> Result<CommonArgs, String> {
-        let Self { json, board, memory, manager, accelerator } = self;
-        let board = match board {
-            None if reads.board => instead_of("--board", BOARD, &variable, board_name)?,
-            given => given,
-        };
+        if given.builds_boards()
+            && let Some(board) = variable(BOARD).filter(|board| !is_blank(board))
+            && !["auto", EMULATED].iter().any(|own| board == *own)
+        {
+            log::warn!("{BOARD} is {board:?}: this command builds emulated boards of its own");
+        }
+        let Given { board: boards, manager, accelerator } = given;
+        let opens = boards.is_some();
+        let (mut board, mut memory, mut of_board) = (None, None, None);
+        if let Some(options) = boards {
+            (board, memory, of_board) = (options.board, options.memory, Some(options.manager));
+            if board.is_none() {
+                board = instead_of("--board", BOARD, &variable, board_name)?;
+            }
+        }
         let board = board.unwrap_or(BoardName::Auto);
         let real = !matches!(board, BoardName::Emulated | BoardName::Socket(_));
-        let named = match reads.board && real && memory.is_none() {
+        let named = match opens && real && memory.is_none() {
             true => instead_of("--memory", MEMORY, &variable, memory_choice)?,
             false => None,
         };
         let memory_of_environment = named.is_some();
         let memory = memory.or(named).unwrap_or(MemoryChoice::Automatic);
-        let manager = match manager {
-            None if reads.manager && real => {
+        let manager = match of_board.or(manager) {
+            Some(ManagerOptions { manager: None }) if real => {
                 instead_of("--manager", MANAGER, &variable, manager_choice)?
             }
-            given => given,
+            options => options.and_then(|options| options.manager),
         };
-        let manager = manager.unwrap_or_default();
         let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
         let accelerator = match accelerator {
-            Some(_) if !reads.accelerator => {
-                return Err("this command takes no --accelerator".to_owned());
-            }
-            Some(_) if !emulated => {
+            Some(AcceleratorOptions { accelerator: Some(_) }) if !emulated => {
                 return Err(
                     "--accelerator is for an emulated board of this process; leave it out, \
                             or add --board emulated"
                         .to_owned(),
                 );
             }
-            None if reads.accelerator && emulated => {
+            Some(AcceleratorOptions { accelerator: None }) if emulated => {
                 instead_of("--accelerator", RTL, &variable, simulator_path)?
             }
-            given => given,
+            options => options.and_then(|options| options.accelerator),
         };
+        let (json, manager) = (self.json, manager.unwrap_or_default());
         let accelerator = accelerator.unwrap_or_default();
         Ok(CommonArgs { json, board, memory, memory_of_environment, manager, accelerator })
     }

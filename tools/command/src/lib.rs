@@ -12,6 +12,5 @@ pub mod interrupt;
 pub mod numbers;
 pub mod options;
 pub mod output;
-pub mod permutation;
 pub mod pile;
 pub mod step_input;

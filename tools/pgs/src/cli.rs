@@ -7,7 +7,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 
 use crate::verbs::Verb;
 use crate::verbs::run::RunArgs;
-use pgs_command::common::{CommonArgs, CommonOptions, Reads};
+use pgs_command::common::{CommonArgs, CommonOptions};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -32,11 +32,14 @@ RUST_LOG=debug shows one line a step, RUST_LOG=trace every register access.
 Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadable input; 3 no
 usable board, or no rights; 4 hardware fault or deadline; 130 interrupted.";
 
+/// The end of the short help.
+const MORE: &str = "`pgs --help` has all options and examples, `pgs VERB --help` those of a verb.";
+
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
 ///
 /// Without a verb, `pgs` runs `run` and takes its options.
 #[derive(Debug, Parser)]
-#[command(name = "pgs", version, after_help = EXAMPLES)]
+#[command(name = "pgs", version, after_help = MORE, after_long_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -46,10 +49,34 @@ struct Cli {
     run: RunArgs,
 }
 
-/// The definition of the command line, for pages and completions.
-#[cfg(feature = "pages")]
+/// Options of `run`, also without the verb, that `-h` shows, in two screens; `--help` shows all.
+const SHORT: [&str; 17] = [
+    "steps",
+    "scene",
+    "grid",
+    "drop",
+    "report_every",
+    "json",
+    "contact_iterations",
+    "friction_iterations",
+    "warm_start",
+    "order",
+    "board",
+    "profile",
+    "hazards",
+    "threads",
+    "fault",
+    "view",
+    "picture",
+];
+
+/// The definition of the command line.
 pub(crate) fn definition() -> clap::Command {
-    Cli::command()
+    let short = |argument: clap::Arg| {
+        let hidden = !SHORT.contains(&argument.get_id().as_str());
+        argument.hide_short_help(hidden)
+    };
+    Cli::command().mut_args(short).mut_subcommand("run", |run| run.mut_args(short))
 }
 
 /// A parsed command line.
@@ -65,13 +92,12 @@ pub(crate) fn parse(
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<Command, clap::Error> {
-    let mut command = Cli::command();
+    let mut command = definition();
     let matches = command.try_get_matches_from_mut(arguments)?;
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options are accepted here as well; before another verb they would have no effect.
         let stray = matches.ids().find(|id| {
-            let common =
-                matches!(id.as_str(), "json" | "board" | "memory" | "manager" | "accelerator");
+            let common = id.as_str() == "json";
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
@@ -88,26 +114,9 @@ pub(crate) fn parse(
     let verb = cli.verb.unwrap_or(Verb::Run(cli.run));
     let common = cli
         .common
-        .complete(reads(&verb), variable)
+        .complete(verb.given(), variable)
         .map_err(|message| command.error(clap::error::ErrorKind::ValueValidation, message))?;
     Ok(Command { verb, common })
-}
-
-/// The common options that a verb reads.
-fn reads(verb: &Verb) -> Reads {
-    Reads {
-        board: match verb {
-            Verb::Load(_) => false,
-            Verb::Thesis(args) => args.opens_board(),
-            _ => true,
-        },
-        manager: !matches!(verb, Verb::Thesis(args) if !args.opens_board()),
-        accelerator: match verb {
-            Verb::List(_) | Verb::Load(_) => false,
-            Verb::Thesis(args) => args.opens_board(),
-            _ => true,
-        },
-    }
 }
 
 #[cfg(test)]
@@ -170,7 +179,7 @@ mod tests {
             "{said}"
         );
         for line in [
-            "pgs --board uio --memory uio run",
+            "pgs --board uio --memory uio",
             "pgs run --board emulated",
             "pgs --board emulated",
             "pgs solve x --memory uio --board uio",
@@ -185,7 +194,7 @@ mod tests {
 
     #[test]
     fn the_definition_is_consistent() {
-        Cli::command().debug_assert();
+        definition().debug_assert();
     }
 
     #[test]
@@ -203,9 +212,9 @@ mod tests {
     }
 
     #[test]
-    fn common_options_stand_on_either_side_of_the_verb() {
+    fn the_form_of_the_output_stands_on_either_side_of_the_verb() {
         for line in [
-            "pgs --json --board emulated --memory uio:m --manager fpga2 list",
+            "pgs --json list --board emulated --memory uio:m --manager fpga2",
             "pgs list --json --board emulated --memory uio:m --manager fpga2",
         ] {
             let common = parsed(line).expect(line).common;
@@ -219,7 +228,7 @@ mod tests {
     #[test]
     fn a_board_is_named_by_its_node_as_memory_is() {
         let board =
-            |text: &str| parsed(&format!("pgs --board {text} check")).map(|c| c.common.board);
+            |text: &str| parsed(&format!("pgs check --board {text}")).map(|c| c.common.board);
         let uio = |node: &str| Ok(BoardName::Uio(node.to_owned()));
         assert_eq!(board("uio"), uio("pgs"));
         assert_eq!(board("uio:pgs@a0000000"), uio("pgs@a0000000"));
@@ -228,21 +237,45 @@ mod tests {
 
     #[test]
     fn the_help_warns_of_logic_that_nobody_asks_about() {
-        let help = Cli::command().render_long_help().to_string();
+        let help = definition().render_long_help().to_string();
         let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(words.contains("WARNING") && words.contains("hangs the processor"), "{words}");
     }
 
     #[test]
     fn a_served_board_is_named_by_its_socket() {
-        let common = parsed("pgs --board socket:/a/b run").expect("a board").common;
+        let common = parsed("pgs run --board socket:/a/b").expect("a board").common;
         assert_eq!(common.board, BoardName::Socket("/a/b".into()));
         let served = parsed("pgs serve --socket x --profile half").expect("a board");
         assert!(matches!(served.verb, Verb::Serve(args) if args.socket.ends_with("x")));
     }
 
+    /// Commands without a board of the user's have no option that names one.
+    #[test]
+    fn options_of_a_board_belong_to_verbs_that_open_one() {
+        for verb in ["faults", "serve --socket x", "thesis half", "thesis compare float half"] {
+            for option in ["--board uio", "--memory uio", "--manager fpga0"] {
+                let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
+                assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
+            }
+            parsed(&format!("pgs {verb} --accelerator rtl:x")).expect(verb);
+        }
+        for verb in ["thesis step", "thesis ladder", "thesis detection --input x", "load x"] {
+            for option in ["--board uio", "--memory uio", "--accelerator model"] {
+                let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
+                assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
+            }
+        }
+        let real = parsed_in("uio", "uio:m", "pgs thesis formats").expect("a board");
+        assert_eq!(real.board, BoardName::Uio(UIO_NODE.to_owned()));
+        for line in ["pgs faults", "pgs thesis half", "pgs thesis step", "pgs serve --socket x"] {
+            assert_eq!(parsed_in("uio", "uio:m", line).expect(line).board, BoardName::Auto);
+        }
+    }
+
     #[test]
     fn options_of_run_before_another_verb_are_refused() {
+        assert_eq!(parsed("pgs --board uio list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(
             parsed("pgs --hazards unchecked solve x").expect_err("stray"),

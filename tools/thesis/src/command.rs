@@ -3,11 +3,11 @@
 use std::io::Write;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs, Given};
 use pgs_command::failure::{Failure, Verdict};
 use serde_json::json;
 
-use crate::experiment::{Experiment, SCHEMA};
+use crate::experiment::{Boards, Experiment, SCHEMA};
 use crate::index::section_key;
 use crate::report::{self, AllArgs};
 use crate::session::Session;
@@ -46,6 +46,8 @@ pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
         &study::time_step::TIME_STEP,
         &study::stopping::STOPPING,
         &study::split::SPLIT,
+        &study::pile::PILE,
+        &study::stages::STAGES,
         &study::determinism::ORDERS,
         &study::half::HALF,
         &study::ladder::LADDER,
@@ -54,7 +56,7 @@ pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
         &detect::DETECTION,
         &compare::COMPARE,
     ];
-    all.extend(formulas::FORMULAS.iter().map(|(formula, _)| formula as &dyn Experiment));
+    all.extend(formulas::FORMULAS.iter().map(|formula| formula as &dyn Experiment));
     all.sort_by_key(|experiment| section_key(experiment.thesis()));
     all
 }
@@ -66,7 +68,15 @@ impl Args for ThesisArgs {
             .action(ArgAction::SetTrue)
             .help("Print Markdown instead of text");
         let each = experiments().into_iter().map(|experiment| {
-            experiment.arguments(Command::new(experiment.id())).arg(markdown.clone())
+            let command = experiment.arguments(Command::new(experiment.id()));
+            let command = command.arg(markdown.clone());
+            match experiment.boards() {
+                Boards::None => command,
+                Boards::Own => AcceleratorOptions::augment_args(command),
+                Boards::Any => {
+                    AcceleratorOptions::augment_args(BoardOptions::augment_args(command))
+                }
+            }
         });
         AllArgs::augment_args(command)
             .about("Measure the thesis again: its tables and figures from our own numbers")
@@ -108,14 +118,18 @@ impl ThesisArgs {
         }
     }
 
-    /// Whether a board is opened.
+    /// The options of a board that the experiment has.
     #[must_use]
-    pub fn opens_board(&self) -> bool {
-        match &self.one {
-            None => self.all.is_asked(),
-            Some((name, _)) => {
-                experiments().iter().any(|each| each.id() == name && each.opens_board())
-            }
+    pub fn given(&self) -> Given {
+        let Some((name, options)) = &self.one else { return Given::default() };
+        let boards = experiments().iter().find(|each| each.id() == name).map(|each| each.boards());
+        let has = |least| boards.filter(|boards| *boards >= least);
+        // The same parser has put the options there.
+        Given {
+            board: has(Boards::Any).and_then(|_| BoardOptions::from_arg_matches(options).ok()),
+            accelerator: has(Boards::Own)
+                .and_then(|_| AcceleratorOptions::from_arg_matches(options).ok()),
+            manager: None,
         }
     }
 
@@ -148,7 +162,7 @@ impl ThesisArgs {
 /// Writes the list of experiments.
 fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
     let columns = [("name", "name"), ("thesis", "thesis"), ("about", "")];
-    let mut table = Table::new("experiments", "Experiments", &columns);
+    let mut table = Table::with_columns("experiments", "Experiments", &columns);
     for experiment in experiments() {
         table.row([text(experiment.id()), text(experiment.thesis()), text(experiment.about())]);
     }

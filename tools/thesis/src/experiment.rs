@@ -1,6 +1,7 @@
 //! An experiment: a place of the thesis, arguments, and a run that leads to tables and figures.
 
 use std::io::Write;
+use std::path::Path;
 
 use clap::{ArgMatches, Args, Command};
 use pgs_command::failure::{Failure, Verdict};
@@ -12,13 +13,23 @@ use serde_json::{Value, json};
 use crate::figure::Figure;
 use crate::index::{Row, section_key};
 use crate::session::Session;
-use crate::table::Table;
+use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub(crate) const SCHEMA: u32 = 3;
 
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
+
+/// The boards that an experiment steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Boards {
+    None,
+    /// Emulated ones that it builds itself.
+    Own,
+    /// One that the user names.
+    Any,
+}
 
 /// An experiment of the thesis part.
 pub(crate) trait Experiment: Sync {
@@ -31,14 +42,21 @@ pub(crate) trait Experiment: Sync {
     /// Its subject, in a line.
     fn about(&self) -> &'static str;
 
-    /// Whether it steps a board.
-    fn opens_board(&self) -> bool;
+    /// The boards that it steps.
+    fn boards(&self) -> Boards;
 
     /// Adds its arguments and its help.
     fn arguments(&self, command: Command) -> Command;
 
     /// Measures or computes; `matches` are of its arguments.
     fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure>;
+}
+
+/// A folder as a figure names it: as it was given, or only its name. A page is passed on, and the
+/// folders of its author's machine mean nothing to its readers.
+pub(crate) fn shown(folder: &Path) -> String {
+    let name = folder.file_name().filter(|_| folder.is_absolute());
+    name.map_or(folder, Path::new).display().to_string()
 }
 
 /// The findings of an experiment.
@@ -67,6 +85,19 @@ impl Part {
     pub(crate) fn with(mut self, outcome: &impl Serialize) -> Self {
         self.data = serde_json::to_value(outcome).unwrap_or_else(|_| json!({}));
         self
+    }
+
+    /// Adds a figure, and the rows of the index that lead to it.
+    pub(crate) fn figure(&mut self, figure: Figure, rows: impl IntoIterator<Item = Row>) {
+        self.figures.push(figure);
+        self.rows.extend(rows);
+    }
+
+    /// Names the command that prints the rows, where they name no other.
+    pub(crate) fn printed_by(&mut self, command: &str) {
+        for row in self.rows.iter_mut().filter(|row| row.command.is_empty()) {
+            command.clone_into(&mut row.command);
+        }
     }
 
     /// Adds the figures and rows of another part behind this one's.
@@ -110,12 +141,23 @@ impl Part {
         document
     }
 
+    /// The rows of the index as a table, of an experiment that has no other.
+    fn index(&self) -> Option<Table> {
+        let columns =
+            [("thesis", "thesis"), ("subject", ""), ("recorded", "its figure"), ("ours", "ours")];
+        let mut table = Table::with_columns("index", "Beside the thesis", &columns);
+        for Row { thesis, subject, recorded, ours, .. } in &self.rows {
+            table.row([thesis, subject, recorded, ours].map(text));
+        }
+        self.tables.is_empty().then_some(table)
+    }
+
     /// For people.
     pub(crate) fn write_text(&self, out: &mut dyn Write) -> Result<(), Failure> {
         for (label, text) in &self.facts {
             fact(out, label, text)?;
         }
-        for table in &self.tables {
+        for table in self.tables.iter().chain(&self.index()) {
             write!(out, "\n{}", table.to_text(stdout_width()))?;
         }
         if !self.complete && self.agrees {
@@ -134,7 +176,7 @@ impl Part {
         for (_, text) in &self.facts {
             writeln!(out, "{text}\n")?;
         }
-        for table in &self.tables {
+        for table in self.tables.iter().chain(&self.index()) {
             write!(out, "{}", table.to_markdown())?;
         }
         Ok(())
@@ -146,7 +188,7 @@ pub(crate) struct Measured<A> {
     pub(crate) id: &'static str,
     pub(crate) thesis: &'static str,
     pub(crate) about: &'static str,
-    pub(crate) opens_board: bool,
+    pub(crate) boards: Boards,
     pub(crate) run: fn(&A, &Session) -> Result<Part, Failure>,
 }
 
@@ -163,8 +205,8 @@ impl<A: Args> Experiment for Measured<A> {
         self.about
     }
 
-    fn opens_board(&self) -> bool {
-        self.opens_board
+    fn boards(&self) -> Boards {
+        self.boards
     }
 
     fn arguments(&self, command: Command) -> Command {
@@ -174,5 +216,17 @@ impl<A: Args> Experiment for Measured<A> {
     fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure> {
         let arguments = A::from_arg_matches(matches).map_err(Failure::input)?;
         (self.run)(&arguments, session)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_names_no_folder_above_that_of_the_step() {
+        let names = ["tests/golden/two_cubes", "/home/somebody/two_cubes/", "/"];
+        let found = names.map(|name| shown(Path::new(name)));
+        assert_eq!(found, ["tests/golden/two_cubes", "two_cubes", "/"]);
     }
 }

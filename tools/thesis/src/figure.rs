@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde_json::{Value, json};
 
-use crate::index::Origin;
+use crate::index::{Origin, Row};
 
 /// A picture with its caption.
 #[derive(Debug, Clone)]
@@ -24,6 +24,34 @@ pub(crate) struct Figure {
 }
 
 impl Figure {
+    /// A figure of numbers that were measured.
+    pub(crate) fn new(
+        (id, thesis): (&'static str, &'static str),
+        title: impl Into<String>,
+        svg: String,
+        caption: impl Into<String>,
+    ) -> Self {
+        let (title, caption, origin) = (title.into(), caption.into(), Origin::Measured);
+        Self { id, thesis, title, svg, caption, origin, playback: None }
+    }
+
+    /// The same of numbers that were computed.
+    pub(crate) fn modelled(self) -> Self {
+        Self { origin: Origin::Modelled, ..self }
+    }
+
+    /// A row of the index that leads here: the subject, the thesis' figure and ours.
+    pub(crate) fn row(
+        &self,
+        subject: impl Into<String>,
+        recorded: impl Into<String>,
+        ours: impl Into<String>,
+    ) -> Row {
+        let (subject, recorded, ours) = (subject.into(), recorded.into(), ours.into());
+        let (thesis, shown) = (self.thesis.to_owned(), self.id.to_owned());
+        Row { thesis, subject, recorded, ours, origin: self.origin, command: String::new(), shown }
+    }
+
     pub(crate) fn to_json(&self) -> Value {
         json!({
             "id": self.id,

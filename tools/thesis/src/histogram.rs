@@ -74,6 +74,23 @@ impl Histogram {
         self.original_zero += other.original_zero;
     }
 
+    /// The share of numbers that deviate by less than each edge, percent.
+    pub(crate) fn below(&self) -> Vec<(f64, f64)> {
+        let Self { edges_percent, counts, equal, below, above, .. } = self;
+        let all = equal + below + above + counts.iter().sum::<u64>();
+        let share = |count: u64| 100.0 * count as f64 / (all as f64).max(1.0);
+        let mut sum = equal + below;
+        let mut points = Vec::with_capacity(edges_percent.len());
+        for (edge, count) in edges_percent.iter().zip(counts.iter().chain([above])) {
+            points.push((*edge, share(sum)));
+            if sum == all {
+                break;
+            }
+            sum += count;
+        }
+        points
+    }
+
     /// The shares of the numbers by decade, among all whose original is not 0: the lower edge of the
     /// decade in percent, and the share. The first is of the numbers below the lowest edge.
     pub(crate) fn decades(&self) -> Vec<(f64, f64)> {
@@ -123,6 +140,15 @@ mod tests {
         assert_eq!(full.len(), 2);
         assert!((0.5..=1.01).contains(&full[0]) && (56.0..=100.01).contains(&full[1]), "{full:?}");
         assert_eq!(found.counts.iter().sum::<u64>(), 2);
+    }
+
+    #[test]
+    fn shares_below_rise_to_all_numbers() {
+        let points = Histogram::of([(1.0, 1.0), (1.0, 1.005), (1.0, 1.5)]).below();
+        assert!(points.windows(2).all(|pair| pair[0].1 <= pair[1].1));
+        let at =
+            |edge: f64| points.iter().find(|point| point.0 >= edge * 0.999).expect("an edge").1;
+        assert!((at(0.1) - 100.0 / 3.0).abs() < 1e-9 && (at(1.0) - 200.0 / 3.0).abs() < 1e-9);
     }
 
     #[test]

@@ -90,12 +90,13 @@ pub(crate) fn section_key(thesis: &str) -> Vec<u32> {
 }
 
 /// Figures of the thesis that have no counterpart here, and why.
-pub(crate) const WITHOUT_COUNTERPART: [(&str, &str); 6] = [
+pub(crate) const WITHOUT_COUNTERPART: [(&str, &str); 7] = [
     ("Figure 2.1", "the loop of a simulation: a diagram without numbers"),
     ("Figure 2.3", "the bounding box of a sphere: a drawing without numbers"),
     ("Figure 2.4", "two bounding boxes apart: a drawing without numbers"),
     ("Figure 2.5", "two bounding boxes that overlap: a drawing without numbers"),
     ("Figure 2.7", "the pipeline of Bullet, another program: a diagram without numbers"),
+    ("Figure 2.8", "the separating axis of two bodies: a drawing without numbers"),
     ("Figure 5.3", "the blocks of the first design: a diagram; Figure 5.1 has the stages of naive"),
 ];
 

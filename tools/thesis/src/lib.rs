@@ -15,6 +15,7 @@ mod histogram;
 mod index;
 mod narrow;
 mod order;
+mod permutation;
 mod report;
 mod session;
 mod study;

@@ -4,7 +4,6 @@ use indicatif::ProgressBar;
 
 use pgs_command::board::OpenBoard;
 use pgs_command::common::{BoardName, CommonArgs};
-use pgs_command::failure::Failure;
 use pgs_command::interrupt::Interrupt;
 use pgs_command::output::progress::progress_bar;
 
@@ -31,12 +30,8 @@ impl Session {
     }
 
     /// The options with the emulated board, for experiments that build their boards themselves.
-    pub(crate) fn emulated(&self) -> Result<CommonArgs, Failure> {
-        if !matches!(self.common.board, BoardName::Auto | BoardName::Emulated) {
-            let error = "this experiment builds its boards itself and cannot use a real one";
-            return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
-        }
-        Ok(CommonArgs { board: BoardName::Emulated, ..self.common.clone() })
+    pub(crate) fn emulated(&self) -> CommonArgs {
+        CommonArgs { board: BoardName::Emulated, ..self.common.clone() }
     }
 
     /// Announces further steps.

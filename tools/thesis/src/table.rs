@@ -106,6 +106,24 @@ pub(crate) struct Column {
     pub(crate) head: &'static str,
 }
 
+/// A cell of a row, which may bring its column.
+pub(crate) trait InRow {
+    fn split(self) -> (Option<Column>, Cell);
+}
+
+impl InRow for Cell {
+    fn split(self) -> (Option<Column>, Cell) {
+        (None, self)
+    }
+}
+
+impl InRow for (&'static str, &'static str, Cell) {
+    fn split(self) -> (Option<Column>, Cell) {
+        let (key, head, cell) = self;
+        (Some(Column { key, head }), cell)
+    }
+}
+
 /// A table with its notes.
 #[derive(Debug, Clone)]
 pub(crate) struct Table {
@@ -125,8 +143,13 @@ pub(crate) fn escaped(text: &str) -> String {
 }
 
 impl Table {
+    /// A table whose first row brings the columns.
+    pub(crate) fn new(id: &'static str, title: impl Into<String>) -> Self {
+        Self::with_columns(id, title, &[])
+    }
+
     /// A table without rows; columns are (key, heading).
-    pub(crate) fn new(
+    pub(crate) fn with_columns(
         id: &'static str,
         title: impl Into<String>,
         columns: &[(&'static str, &'static str)],
@@ -135,8 +158,12 @@ impl Table {
         Self { id, title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
     }
 
-    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
-        let cells: Vec<Cell> = cells.into_iter().collect();
+    /// Adds a row of cells, or of (key, heading, cell).
+    pub(crate) fn row<C: InRow>(&mut self, cells: impl IntoIterator<Item = C>) {
+        let (columns, cells): (Vec<_>, Vec<_>) = cells.into_iter().map(InRow::split).unzip();
+        if self.columns.is_empty() {
+            self.columns = columns.into_iter().flatten().collect();
+        }
         debug_assert_eq!(cells.len(), self.columns.len(), "{}", self.id);
         self.rows.push(cells);
     }
@@ -279,8 +306,11 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let mut table =
-            Table::new("T.1", "A table", &[("name", "name"), ("n", "n\nall"), ("d", "diff.")]);
+        let mut table = Table::with_columns(
+            "T.1",
+            "A table",
+            &[("name", "name"), ("n", "n\nall"), ("d", "diff.")],
+        );
         table.row([text("a|b"), Cell::Whole(1234), Cell::Difference(0.174)]);
         table.row([text("<c>"), Cell::Missing, Cell::Number(2.0, 1)]);
         table.note("Said.");

@@ -58,9 +58,10 @@ pub struct BuildArgs {
     /// multiple of it [default: no fence]
     #[arg(long, value_name = "BASE+BYTES", value_parser = number("fence", |build| build.fence))]
     fence: Option<Fence>,
-    /// Threads of this machine for the emulated board's arithmetic, for collision detection, and
-    /// for packing and unpacking a step; no result depends on their number [default: one per
-    /// processor, at most 4]
+    /// Threads of this machine
+    ///
+    /// For the emulated board's arithmetic, for collision detection, and for packing and unpacking a
+    /// step; no result depends on their number [default: one per processor, at most 4]
     #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
     threads: Option<usize>,
     /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]

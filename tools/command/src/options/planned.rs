@@ -11,9 +11,10 @@ use zynq_pgs::StepParameters;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub struct PlannedArgs {
-    /// Make the board fail: `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`,
-    /// several faults separated by `;`, or `seed:N` for random ones. `pgs faults --list` prints
-    /// thousands of plans
+    /// Make the board fail; `pgs faults --list` prints plans
+    ///
+    /// `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`, several faults separated by
+    /// `;`, or `seed:N` for random ones. `pgs faults --list` prints thousands of plans.
     #[arg(long, value_name = "PLAN")]
     fault: Option<Planned>,
 }

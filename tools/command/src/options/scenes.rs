@@ -29,9 +29,11 @@ pub const DROP: f32 = 1.0;
 /// The scene and its size.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// The falling bodies: the thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules,
-    /// cylinders, convex hulls of several masses), which need a board with world inertia: `pgs run`
-    /// and `pgs thesis formats` build such an emulated board themselves.
+    /// The falling bodies
+    ///
+    /// The thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules, cylinders, convex hulls
+    /// of several masses), which need a board with world inertia: `pgs run` and `pgs thesis formats`
+    /// build such an emulated board themselves.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]

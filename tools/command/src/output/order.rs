@@ -6,28 +6,15 @@ use zynq_pgs::{Capabilities, OrderChoice, StepReport};
 
 use crate::numbers::grouped;
 use crate::options::ordering::{is_sequential, name};
-use crate::permutation::Permutation;
 
 /// How the order of a step relates to Bullet's, in words; none if the order is Bullet's and the
 /// comparison fails all the same.
-pub fn beside_bullet(
-    report: &StepReport,
-    capabilities: &Capabilities,
-    permutation: Option<Permutation>,
-) -> Option<&'static str> {
+pub fn beside_bullet(report: &StepReport, capabilities: &Capabilities) -> Option<&'static str> {
     match report.order {
-        Order::AsGiven if permutation.is_some() => Some(BY_ORDER_ALONE),
         Order::AsGiven if is_sequential(capabilities) => Some("Bullet's own, to compare with it"),
         Order::AsGiven => None,
-        _ => Some(BY_ORDER_ALONE),
+        _ => Some("not Bullet's: results differ by the order alone"),
     }
-}
-
-const BY_ORDER_ALONE: &str = "not Bullet's: results differ by the order alone";
-
-/// The name of a step's order: the command's, or else the driver's.
-fn asked_name(report: &StepReport, permutation: Option<Permutation>) -> String {
-    permutation.map_or_else(|| name(report.order), Permutation::text)
 }
 
 /// The orders of a run's steps, and the number of steps in each: one order may fall back to another
@@ -54,8 +41,8 @@ impl OrdersSent {
 }
 
 /// The order of a step, and the reason for it.
-pub fn with_reason(report: &StepReport, permutation: Option<Permutation>) -> String {
-    let name = asked_name(report, permutation);
+pub fn with_reason(report: &StepReport) -> String {
+    let name = name(report.order);
     match reason(report) {
         Some(reason) => format!("{name}: {reason}"),
         None => name,
@@ -85,8 +72,8 @@ pub fn reason(report: &StepReport) -> Option<String> {
 }
 
 /// The order of a step in words.
-pub fn text(report: &StepReport, permutation: Option<Permutation>) -> String {
-    let mut text = asked_name(report, permutation);
+pub fn text(report: &StepReport) -> String {
+    let mut text = name(report.order);
     if report.empty > 0 {
         let share = report.empty as f64 / (report.collisions as f64).max(1.0);
         text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);

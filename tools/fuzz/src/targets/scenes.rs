@@ -1,7 +1,7 @@
 //! Makes small scenes and parameters for the driver: mostly valid, sometimes invalid ones.
 
 use zynq_pgs::interface::profile::Variant;
-use zynq_pgs::order::{Order, Ties};
+use zynq_pgs::order::Order;
 use zynq_pgs::{
     Body, CONTACT_POINTS, Collision, Contact, Impulses, Pose, Shape, StepParameters, Velocity,
     WarmCollisions,
@@ -236,13 +236,8 @@ pub(super) fn parameters(
         parameters.impulses_out = (all || variant.has_impulses()) && wanted & 8 == 8;
     }
     if switches & 12 == 12 {
-        parameters.order = Some(input.pick(&[
-            Order::AsGiven,
-            Order::HazardFree,
-            Order::HazardFreeNearby,
-            Order::Colours,
-            Order::BodyByBody(Ties::LowestIndex),
-        ]));
+        let orders = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];
+        parameters.order = Some(input.pick(&orders));
     }
     if invalid == InvalidValues::Sometimes && input.one_in(100) {
         let value = f32::from_bits(input.word());

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
 
 use pgs_command::board::{self, ChosenBoard};
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::options::build::{BuildArgs, board_option};
 use pgs_command::output::SCHEMA;
@@ -41,6 +41,10 @@ pub(crate) struct CheckArgs {
     quirk: Option<QuirkName>,
     #[command(flatten)]
     build: BuildArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// A defect of the emulated board.

@@ -8,7 +8,7 @@ use clap::Args;
 use pgs_loading::{AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use serde_json::{Value, json};
 
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{CommonArgs, ManagerOptions};
 use pgs_command::failure::{Cause, Failure, INTERRUPTED, Verdict};
 use pgs_command::interrupt;
 use pgs_command::output::{SCHEMA, milliseconds};
@@ -57,6 +57,8 @@ pub(crate) struct LoadArgs {
     /// Directory that holds the system's files, for tests.
     #[arg(long, hide = true, default_value = "/")]
     system_root: PathBuf,
+    #[command(flatten)]
+    pub(crate) manager: ManagerOptions,
 }
 
 /// The failure of a bitstream that is not loaded.

@@ -20,7 +20,7 @@ use self::load::LoadArgs;
 use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{CommonArgs, Given};
 use pgs_command::failure::{Failure, Verdict};
 
 /// A verb and its options.
@@ -37,6 +37,25 @@ pub(crate) enum Verb {
 }
 
 impl Verb {
+    /// The options of a board that the verb has.
+    pub(crate) fn given(&self) -> Given {
+        let none = Given::default();
+        match self.clone() {
+            Self::Run(RunArgs { board, accelerator, .. })
+            | Self::Solve(SolveArgs { board, accelerator, .. })
+            | Self::Check(CheckArgs { board, accelerator, .. }) => {
+                Given { board: Some(board), accelerator: Some(accelerator), ..none }
+            }
+            Self::List(ListArgs { board, .. }) => Given { board: Some(board), ..none },
+            Self::Load(LoadArgs { manager, .. }) => Given { manager: Some(manager), ..none },
+            Self::Serve(ServeArgs { accelerator, .. })
+            | Self::Faults(FaultsArgs { accelerator, .. }) => {
+                Given { accelerator: Some(accelerator), ..none }
+            }
+            Self::Thesis(args) => args.given(),
+        }
+    }
+
     /// Runs the verb and writes its results to `out`.
     pub(crate) fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
         match self {

@@ -8,10 +8,10 @@ use bitstream_model::interface::address_map::{MEMORY_BASE, MEMORY_BYTES};
 use bitstream_model::remote::{Ended, ServeError, Server, Visit};
 use clap::Args;
 use serde_json::json;
-use zynq_pgs::{MemoryChoice, StepParameters};
+use zynq_pgs::StepParameters;
 
 use pgs_command::board::{external_accelerator, not_built};
-use pgs_command::common::{BoardName, CommonArgs};
+use pgs_command::common::{AcceleratorOptions, CommonArgs};
 use pgs_command::failure::{Cause, Failure, Verdict};
 use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
@@ -53,6 +53,8 @@ pub(crate) struct ServeArgs {
     build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// Counts over all drivers.
@@ -70,14 +72,6 @@ pub(crate) fn run(
     common: &CommonArgs,
     out: &mut dyn Write,
 ) -> Result<Verdict, Failure> {
-    if !matches!(common.board, BoardName::Auto | BoardName::Emulated) {
-        let error = "`pgs serve` serves an emulated board, and no other";
-        return Err(Failure::input(error).next("leave out --board (and PGS_BOARD)"));
-    }
-    if common.memory != MemoryChoice::Automatic && !common.memory_of_environment {
-        let error = "a served board has memory of its own";
-        return Err(Failure::input(error).next("leave out --memory; --memory-mib is its length"));
-    }
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.build.build().config() };

@@ -12,7 +12,7 @@ use crate::bug_report::FaultArgs;
 use crate::difference::{self, Difference};
 use crate::traced::TracedArgs;
 use pgs_command::board;
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::numbers::{Bound, grouped};
@@ -25,7 +25,6 @@ use pgs_command::output::facts::fact;
 use pgs_command::output::files::{Files, Named, unwritten};
 use pgs_command::output::order;
 use pgs_command::output::{limit_text, milliseconds};
-use pgs_command::permutation::{self, Permutation};
 use pgs_command::step_input;
 use step_folder::digest;
 use step_folder::folder::{self, BODY_ORIENTATION, BODY_POSITION, Folder, State};
@@ -109,6 +108,10 @@ pub(crate) struct SolveArgs {
     planned: PlannedArgs,
     #[command(flatten)]
     traced: TracedArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 impl SolveArgs {
@@ -174,35 +177,12 @@ pub(crate) fn run(
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let energy_before = kinetic_energy(&folder.bodies, &folder.shapes);
     let mut bodies = std::mem::take(&mut folder.bodies);
-    let permutation = args.ordering.permutation();
-    let recorded = match permutation {
-        Some(Permutation::Gpu) => permutation::recorded(&folder.path, folder.collisions.len())?,
-        _ => None,
-    };
-    let mut arranger = args.ordering.arranger(recorded);
     let accelerator = &mut opened.accelerator;
     let stepped = step_input::set_shapes(accelerator, &folder.shapes).and_then(|()| {
         if let Some(tracing) = &tracing {
             tracing.begin();
         }
-        match &mut arranger {
-            None => accelerator.step(&mut bodies, &folder.collisions, &parameters),
-            Some(arranger) => {
-                let arranged = arranger.arrange(&bodies, &folder.shapes, &folder.collisions);
-                let stepped = accelerator.step(&mut bodies, arranged, &parameters);
-                // The same refusal names the place in the folder.
-                match stepped {
-                    Err(error) if error.is_input() => {
-                        let as_given = &folder.collisions;
-                        Err(accelerator
-                            .step(&mut bodies, as_given, &parameters)
-                            .err()
-                            .unwrap_or(error))
-                    }
-                    stepped => stepped,
-                }
-            }
-        }
+        accelerator.step(&mut bodies, &folder.collisions, &parameters)
     });
     let traced = tracing.as_ref().map(|tracing| tracing.end(stepped.as_ref().ok()));
     if stepped.is_ok() {
@@ -224,12 +204,11 @@ pub(crate) fn run(
     }
 
     let beside_bullet = match args.compare {
-        true => order::beside_bullet(&report, opened.accelerator.capabilities(), permutation),
+        true => order::beside_bullet(&report, opened.accelerator.capabilities()),
         false => None,
     };
     let solved = StepResult {
         parameters,
-        permutation,
         beside_bullet,
         report,
         energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
@@ -338,8 +317,6 @@ fn compared(bodies: &[Body], expected: &[Expected]) -> Vec<Difference> {
 /// The result of the step.
 struct StepResult {
     parameters: StepParameters,
-    /// The order that the command has made, if it has.
-    permutation: Option<Permutation>,
     /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
@@ -368,7 +345,7 @@ impl StepResult {
             self.parameters.friction_iterations,
             if self.parameters.integrate { "integrated" } else { "not integrated" },
         )?;
-        let mut order = order::text(report, self.permutation);
+        let mut order = order::text(report);
         if let Some(text) = self.beside_bullet.map(str::to_owned).or(order::reason(report)) {
             order += &format!(" ({text})");
         }
@@ -445,7 +422,6 @@ impl StepResult {
                 "contact_iterations": self.parameters.contact_iterations,
                 "friction_iterations": self.parameters.friction_iterations,
                 "integrate": self.parameters.integrate,
-                "permutation": self.permutation.map(Permutation::text),
             },
             "step": pgs_command::output::report_json(&self.report),
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),

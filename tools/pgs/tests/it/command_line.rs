@@ -51,7 +51,7 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         &["--grid", "180x1000x180"],
         &["thesis", "order", "--grid", "180x1000x180"],
         &["--steps", "5", "list"],
-        &["--board", "abacus", "list"],
+        &["list", "--board", "abacus"],
         &["solve"],
         &["solve", "/nonexistent"],
         &["thesis", "step", "--collisions", "1"],
@@ -106,7 +106,7 @@ fn options_of_the_emulated_board_are_refused_for_a_real_one() {
         ("--length-width", "14"),
         ("--address-width", "32"),
     ] {
-        let ran = run(["--board", "uio", "run", option, value]);
+        let ran = run(["run", "--board", "uio", option, value]);
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);
         assert!(ran.stderr.contains(option), "{}", ran.stderr);
         assert!(ran.stderr.contains("--board emulated"), "{}", ran.stderr);
@@ -140,7 +140,7 @@ fn falling_back_to_the_emulated_board_is_said_without_a_warning() {
     }
     let ran = |arguments: &str| {
         let mut pgs = pgs();
-        let pgs = pgs.env_remove("RUST_LOG").args(["--board", "auto"]).args(arguments.split(' '));
+        let pgs = pgs.env_remove("RUST_LOG").args(arguments.split(' ')).args(["--board", "auto"]);
         let ran = Ran::from(pgs.output().expect("it starts"));
         assert_eq!(ran.code, Some(0), "{}", ran.stderr);
         ran

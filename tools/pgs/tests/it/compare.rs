@@ -259,7 +259,10 @@ fn wrong_usage_says_what_is_known() {
         (&["thesis", "compare", "float", "quarter"], "naive, float, half"),
         (&["thesis", "compare", "float", "half,quick"], "thesis16"),
         (&["thesis", "compare", "float", "float,thesis16", "--grid", "2x2x2"], "(half)"),
-        (&["thesis", "compare", "float", "half", "--board", "uio"], "builds its boards itself"),
+        (
+            &["thesis", "compare", "float", "half", "--board", "uio"],
+            "unexpected argument '--board'",
+        ),
         (&["thesis", "compare", "float", "half", "--input", "x", "--grid", "2x2x2"], "--grid"),
         (&["thesis", "compare", "float", "half", "--input", "/nonexistent"], "/nonexistent"),
         (&["thesis", "compare", "float", "half", "--seed", "3"], "--scene shapes"),

@@ -45,7 +45,7 @@ impl Served {
     /// Runs a command on this board.
     fn command(&self, board: &Path) -> Command {
         let mut command = pgs();
-        command.arg("--board").arg(format!("socket:{}", board.display()));
+        command.env("PGS_BOARD", format!("socket:{}", board.display()));
         // It describes real boards, and this one has memory of its own.
         command.env("PGS_MEMORY", "uio");
         command
@@ -122,9 +122,8 @@ fn where_no_board_is_served_there_is_none() {
         Ran::from(command.output().expect("it runs"))
     };
     for (rest, reason) in [
-        (&["--memory", "uio"][..], "a served board has memory of its own"),
-        (&["--board", "uio"], "serves an emulated board"),
-        (&["--memory", "file:/dev/shm/board"], "a served board brings its memory: leave out"),
+        (&["--memory", "uio"][..], "similar argument exists: '--memory-mib'"),
+        (&["--board", "uio"], "unexpected argument '--board'"),
         (&["--format", "thesis16"], "take a profile with streams of 16 bits"),
     ] {
         let ran = serve(rest);

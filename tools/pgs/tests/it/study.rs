@@ -1,11 +1,7 @@
-//! Experiments of `pgs thesis` that step a board: its figures agree with single runs, whose results are compared here by hand, and with
-//! `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
-
-use std::fs;
-use std::path::Path;
+//! Experiments of `pgs thesis` that step a board: their figures agree with each other, and with `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
 
 use crate::common::{
-    DATA, copy, golden, near, number, run, skipped, text, variable, write as write_array,
+    copy, golden, near, number, run, skipped, text, variable, write as write_array,
 };
 use serde_json::Value;
 
@@ -23,29 +19,10 @@ fn once<'a>(document: &'a Value, format: &str, of: &str) -> &'a Value {
     &sum[format!("{}_{of}", format.trim_start_matches("thesis16-"))]
 }
 
-/// The values of an array of f32.
-fn values(folder: &Path, file: &str) -> Vec<f64> {
-    let bytes = fs::read(folder.join(file)).expect("the array");
-    let words = bytes[DATA..].chunks_exact(4);
-    words.map(|word| f32::from_le_bytes(word.try_into().expect("four bytes")).into()).collect()
-}
-
-/// The positions of the moving bodies after the step of a folder in an order. Body 0 is static.
-fn positions_after(input: &str, order: &str) -> Vec<f64> {
-    let results = tempfile::tempdir().expect("a folder");
-    let out = text(results.path());
-    let ran = run(["solve", input, "--order", order, "--out", out]);
-    assert_eq!(ran.code, Some(0), "{order}: {}", ran.stderr);
-    values(results.path(), "out_pos.npy").split_off(3)
-}
-
-/// The mean of |new - original| / |original|, percent, and the share below 1 %.
-fn deviation(original: &[f64], new: &[f64]) -> [f64; 2] {
-    let pairs = original.iter().zip(new).filter(|(original, _)| original.abs() > 0.0);
-    let each: Vec<f64> = pairs.map(|(o, n)| (n - o).abs() / o.abs() * 100.0).collect();
-    let count = each.len() as f64;
-    let sum = each.iter().fold(0.0, |sum, one| sum + one);
-    [sum / count, each.iter().filter(|one| **one < 1.0).count() as f64 / count]
+/// The step of a folder in the orders of two boards, by `pgs thesis compare`.
+fn in_two_orders(input: &str, [original, new]: [&str; 2]) -> Value {
+    let builds = [original, new].map(|order| format!("float,{order}"));
+    study(&["compare", &builds[0], &builds[1], "--input", input])
 }
 
 #[test]
@@ -59,14 +36,14 @@ fn the_deviation_of_orders_is_that_of_single_steps() {
     let compared = [&document["gpu"], &document["pairs"][0], &document["pairs"][1]];
     let orders = [["gpu", "as-given"], ["random=5", "random=6"], ["random=7", "random=8"]];
     let mut means = Vec::new();
-    for (comparison, [original, new]) in compared.into_iter().zip(orders) {
-        assert_eq!((&comparison["original"], &comparison["new"]), (&original.into(), &new.into()));
+    for (comparison, orders) in compared.into_iter().zip(orders) {
+        assert_eq!([&comparison["original"], &comparison["new"]], orders);
         let point = &comparison["curve"][0];
-        let [mean, under] =
-            deviation(&positions_after(input, original), &positions_after(input, new));
-        assert!(mean > 1e-3, "{original} and {new} differ");
-        near(&point["position"]["relative_mean_percent"], mean, 1e-9);
-        near(&point["position"]["under_1_percent_share"], under, 1e-9);
+        let expected = in_two_orders(input, orders)["rows"][1]["difference"].clone();
+        assert_eq!(point["position"], expected["position"], "{orders:?}");
+        assert_eq!(point["linear_velocity"], expected["linear_velocity"], "{orders:?}");
+        let mean = number(&point["position"]["relative_mean_percent"]);
+        assert!(mean > 1e-3, "{orders:?} differ");
         means.push(mean);
         let bins = comparison["position_histogram"]["counts"].as_array().expect("counts");
         let binned = bins.iter().fold(0.0, |sum, count| sum + number(count));
@@ -94,8 +71,8 @@ fn the_order_of_the_gpu_is_that_of_the_folder_if_it_has_one() {
     assert_eq!(document["over_pairs"], Value::Array(Vec::new()));
 
     write_array(&folder, "gpu_order.npy", "<u4", &[2], &[1_u32.to_le_bytes()]);
-    for verb in [&["thesis", "determinism", "--input"][..], &["solve", "--order", "gpu"]] {
-        let ran = run([verb, &[input]].concat());
+    for verb in [&["thesis", "determinism"][..], &["thesis", "compare", "float,gpu", "float"]] {
+        let ran = run([verb, &["--input", input]].concat());
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);
         assert!(ran.stderr.contains("each index below 2 once"), "{}", ran.stderr);
     }
@@ -191,39 +168,43 @@ fn a_step_of_the_pile_is_the_same_in_every_verb() {
 }
 
 #[test]
-fn every_verb_takes_an_order_of_the_command() {
+fn a_board_gets_the_collisions_in_an_order_of_the_thesis_part() {
     let input = golden("pile5_step62");
     let input = text(&input);
-    let digest = |order: &str| {
-        let ran = run(["solve", input, "--digest", "--order", order]);
-        assert_eq!(ran.code, Some(0), "{order}: {}", ran.stderr);
-        ran.stdout
-    };
-    let orders = ["as-given", "gpu", "random=1", "random=2"].map(digest);
-    for (place, one) in orders.iter().enumerate() {
-        assert!(!orders[..place].contains(one), "each order has its own result");
+    let orders = [
+        "as-given",
+        "gpu",
+        "colours",
+        "body-by-body",
+        "body-by-body-oldest",
+        "body-by-body-newest",
+        "random=1",
+        "random=2",
+    ];
+    let digests = orders.map(|order| {
+        let document = in_two_orders(input, [order, order]);
+        assert_eq!(document["a"]["digest"], document["b"]["digest"], "{order}");
+        assert_eq!(document["a"]["build"], format!("float,{order}"));
+        document["a"]["digest"]["value"].clone()
+    });
+    for (place, one) in digests.iter().enumerate() {
+        assert!(
+            !digests[..place].contains(one),
+            "{}: each order has its own result",
+            orders[place]
+        );
     }
-    assert_eq!(digest("random=1"), orders[2]);
-    let ran = run(["solve", input, "--compare", "--order", "random=1"]);
-    assert_eq!(ran.code, Some(1));
-    let said = "order      random=1 (not Bullet's: results differ by the order alone)";
-    assert!(ran.stdout.contains(said), "{}", ran.stdout);
+    let given = run(["solve", input, "--digest", "--order", "as-given"]).stdout;
+    assert!(given.trim_end().ends_with(digests[0].as_str().expect("a digest")), "{given}");
 
+    // Another order in each step, the same for a seed.
     let end = |order: &str| {
-        let scene = ["run", "--json", "--grid", "3x3x3", "--steps", "60", "--order", order];
-        run(scene).json()
+        let build = format!("float,{order}");
+        study(&["compare", &build, &build, "--grid", "3x3x3", "--steps", "60"])["a"]["digest"]
+            .clone()
     };
-    let [one, again, gpu] = ["random=3", "random=3", "gpu"].map(end);
-    assert_eq!(one["digest"], again["digest"]);
-    assert_ne!(one["digest"], gpu["digest"]);
-    assert_eq!(one["config"]["permutation"], "random=3");
-
-    let compared =
-        run(["thesis", "compare", "float,random=1", "float,gpu", "--input", input, "--json"]);
-    assert_eq!(
-        compared.json()["a"]["digest"]["value"],
-        orders[2].trim_start_matches(|c| c != ' ').trim()
-    );
+    assert_eq!(end("random=3"), end("random=3"));
+    assert_ne!(end("random=3"), end("gpu"));
 }
 
 #[test]
@@ -232,8 +213,8 @@ fn a_refused_collision_is_named_by_its_place_in_the_folder() {
     crate::common::patch(&folder, "contact_bodies.npy", 5, 126_u32.to_le_bytes());
     let input = text(folder.path());
     for verb in [
-        &["solve", "--order", "random=4"][..],
-        &["solve", "--order", "gpu"],
+        &["thesis", "compare", "float,random=4", "float,body-by-body", "--input"][..],
+        &["thesis", "compare", "float,gpu", "float,colours", "--input"],
         &["thesis", "determinism", "--input"],
         &["thesis", "half", "--input"],
         &["thesis", "stopping", "--input"],
@@ -254,7 +235,7 @@ fn what_cannot_be_studied_is_refused() {
         (&["determinism", "--input", input, "--hazards", "unchecked"][..], "stale velocities"),
         (&["determinism", "--input", input, "--steps", "3"], "cannot be used with"),
         (&["half", "--input", input, "--grid", "2x2x2"], "cannot be used with"),
-        (&["half", "--grid", "2x2x2", "--board", "uio"], "leave out --board"),
+        (&["half", "--grid", "2x2x2", "--board", "uio"], "unexpected argument '--board'"),
         (&["half", "--grid", "2x2x2", "--build", "halv"], "halv"),
         (&["weather"], "weather"),
     ] {
@@ -262,11 +243,14 @@ fn what_cannot_be_studied_is_refused() {
         assert_eq!(ran.code, Some(2), "{arguments:?}: {}{}", ran.stdout, ran.stderr);
         assert!(ran.stderr.contains(part), "{arguments:?}: {}", ran.stderr);
     }
-    for wrong in ["random=", "random=-1", "order=gpu", "cells"] {
-        let ran = run(["solve", input, "--order", wrong]);
+    for wrong in ["random=", "random=-1", "cells"] {
+        let ran = run(["thesis", "compare", &format!("float,{wrong}"), "float"]);
         assert_eq!(ran.code, Some(2), "{wrong}");
         assert!(ran.stderr.contains("random=SEED"), "{}", ran.stderr);
     }
+    let ran = run(["solve", input, "--order", "gpu"]);
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.stderr.contains("hazard-free-nearby"), "{}", ran.stderr);
 }
 
 /// Measured on the same step by a program outside this project.

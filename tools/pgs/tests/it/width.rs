@@ -10,12 +10,30 @@ fn on_terminal(columns: usize, arguments: &str) -> Vec<String> {
     let command = format!("stty rows 24 cols {columns}; exec '{pgs}' {arguments}");
     let mut script = Command::new("script");
     script.args(["-qec", &command, "/dev/null"]).env("RUST_LOG", "error");
+    // Words in bold would have more characters than columns.
+    script.env("NO_COLOR", "1");
     let ran: Ran = script.stdin(Stdio::null()).output().expect("script runs").into();
     ran.stdout.lines().map(|line| line.trim_end_matches('\r').to_owned()).collect()
 }
 
 fn words<'a>(lines: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     lines.into_iter().flat_map(str::split_whitespace).collect()
+}
+
+/// The short help of a run fits two screens of 24 lines; `--help` has the rest.
+#[test]
+fn the_short_help_of_a_run_fits_two_screens() {
+    if Command::new("script").arg("--version").output().is_err() {
+        return skipped("the width of terminals (script of util-linux is not installed)");
+    }
+    let lines = on_terminal(80, "run -h");
+    assert!((20..=48).contains(&lines.len()), "{} lines: {lines:#?}", lines.len());
+    assert!(lines.iter().all(|line| line.chars().count() <= 80), "{lines:#?}");
+    let long = on_terminal(80, "run --help");
+    for option in ["--length-width", "--manager", "--frames-per-second", "Examples:"] {
+        let has = |lines: &[String]| lines.iter().any(|line| line.contains(option));
+        assert!(has(&long) && !has(&lines), "{option}");
+    }
 }
 
 #[test]

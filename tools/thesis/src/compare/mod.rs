@@ -22,7 +22,7 @@ use zynq_pgs::StepParameters;
 use self::side::{Side, World};
 use self::spec::SideSpec;
 use crate::deviation::StateDeviation;
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
 use crate::table::Table;
 
@@ -44,7 +44,7 @@ change is a word: binary16, thesis16, thesis16-literal (numbers on 16-bit stream
 bandwidth=GBPS, arithmetic=f32|binary16, length-width=BITS, address-width=BITS, threads=N and
 lanes=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
 hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
-random=SEED (see `pgs solve --help`). Without an order, a board that waits on hazards takes the
+random=SEED (another one in each step). Without an order, a board that waits on hazards takes the
 collisions as given, so that two such boards solve them in the same order. Each board detects its
 own collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in
 model.
@@ -69,7 +69,7 @@ pub(crate) static COMPARE: Measured<CompareArgs> = Measured {
     id: "compare",
     thesis: "§4.6.3, equation 4.1",
     about: "Two boards from the same start, and how far they diverge",
-    opens_board: true,
+    boards: Boards::Own,
     run: measure,
 };
 
@@ -155,7 +155,7 @@ fn vector(b: [f64; 3], a: [f64; 3]) -> [f64; 3] {
 
 /// Steps both boards.
 fn measure(args: &CompareArgs, session: &Session) -> Result<Part, Failure> {
-    let common = &session.emulated()?;
+    let common = &session.emulated();
     let folder = args.input.as_deref().map(step_input::load).transpose()?;
     let own = folder.as_ref().map_or_else(StepParameters::default, |folder| folder.parameters);
     let mut parameters = args.deadline.apply(args.solver.apply(own));

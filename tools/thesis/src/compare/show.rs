@@ -12,7 +12,7 @@ use pgs_command::numbers::{grouped, number};
 
 /// A table without rows for the steps that are shown.
 pub(super) fn steps() -> Table {
-    Table::new(
+    Table::with_columns(
         "boards",
         "Both boards, and B minus A",
         &[
@@ -92,22 +92,7 @@ fn of_board(measured: &Measured) -> [Cell; 8] {
 /// The deviations of the last step.
 pub(super) fn last(row: &Row) -> Option<Table> {
     let state = row.deviation.as_ref()?;
-    let mut table = Table::new(
-        "last",
-        format!("Step {}, B against A", row.step),
-        &[
-            ("of", "of"),
-            ("under_1_percent", "% under\n1 %"),
-            ("within_1_percent", "% within\n1 %"),
-            ("mean_percent", "relative\nmean %"),
-            ("most_percent", "relative\nmost %"),
-            ("absolute_mean", "absolute\nmean"),
-            ("absolute_most", "absolute\nmost"),
-            ("components", "components"),
-            ("zeros", "zeros\nof A"),
-            ("zeros_moved", "not\nin B"),
-        ],
-    );
+    let mut table = Table::new("last", format!("Step {}, B against A", row.step));
     for (name, deviation) in [
         ("position, m", &state.position),
         ("linear, m/s", &state.linear),
@@ -115,16 +100,16 @@ pub(super) fn last(row: &Row) -> Option<Table> {
     ] {
         let Deviation { mean, largest, mean_absolute, largest_absolute, .. } = *deviation;
         table.row([
-            text(name),
-            Cell::Digits(deviation.under_share() * 100.0),
-            Cell::Digits(deviation.within_share() * 100.0),
-            Cell::Digits(mean * 100.0),
-            Cell::Digits(largest * 100.0),
-            Cell::Digits(mean_absolute),
-            Cell::Digits(largest_absolute),
-            Cell::Whole(deviation.components),
-            Cell::Whole(deviation.zeros),
-            Cell::Whole(deviation.zeros_moved),
+            ("of", "of", text(name)),
+            ("under_1_percent", "% under\n1 %", Cell::Digits(deviation.under_share() * 100.0)),
+            ("within_1_percent", "% within\n1 %", Cell::Digits(deviation.within_share() * 100.0)),
+            ("mean_percent", "relative\nmean %", Cell::Digits(mean * 100.0)),
+            ("most_percent", "relative\nmost %", Cell::Digits(largest * 100.0)),
+            ("absolute_mean", "absolute\nmean", Cell::Digits(mean_absolute)),
+            ("absolute_most", "absolute\nmost", Cell::Digits(largest_absolute)),
+            ("components", "components", Cell::Whole(deviation.components)),
+            ("zeros", "zeros\nof A", Cell::Whole(deviation.zeros)),
+            ("zeros_moved", "not\nin B", Cell::Whole(deviation.zeros_moved)),
         ]);
     }
     Some(table)

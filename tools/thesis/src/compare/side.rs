@@ -10,10 +10,10 @@ use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters,
 use super::spec::SideSpec;
 use crate::deviation::{moving, unmoved_share};
 use crate::narrow::carried;
+use crate::permutation::{self, Arranger, Permutation};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{BoardName, CommonArgs};
 use pgs_command::failure::Failure;
-use pgs_command::permutation::{self, Arranger, Permutation};
 use pgs_command::step_input;
 use step_folder::digest;
 use step_folder::folder::Folder;
@@ -127,13 +127,13 @@ impl<'a> Side<'a> {
         };
         let (opened, world) =
             begin().map_err(|failure: Failure| failure.about(format!("board {name} ({spec})")))?;
-        let recorded = match (&world, spec.ordering.permutation()) {
+        let recorded = match (&world, spec.permutation) {
             (World::Folder { folder, .. }, Some(Permutation::Gpu)) => {
                 permutation::recorded(&folder.path, folder.collisions.len())?
             }
             _ => None,
         };
-        let arranger = spec.ordering.arranger(recorded);
+        let arranger = spec.permutation.map(|order| Arranger::new(order, recorded));
         Ok(Self { name, spec, opened, world, failed: None, arranger, gravity })
     }
 

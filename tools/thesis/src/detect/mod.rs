@@ -16,7 +16,7 @@ use serde_json::json;
 
 use self::comparison::Comparison;
 use self::input::Input;
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
 
 const EXAMPLES: &str = "\
@@ -48,7 +48,7 @@ pub(crate) static DETECTION: Measured<DetectionArgs> = Measured {
     id: "detection",
     thesis: "§2.2.2",
     about: "Our collision detection beside a folder's collisions of the same poses",
-    opens_board: false,
+    boards: Boards::None,
     run: measure,
 };
 

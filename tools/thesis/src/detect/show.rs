@@ -76,7 +76,7 @@ pub(super) fn part(comparison: &Comparison, scene: &Scene) -> Part {
 
 /// The pairs of each side.
 fn pairs(comparison: &Comparison) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "pairs",
         "Pairs of bodies in contact",
         &[
@@ -113,7 +113,7 @@ fn tallies(id: &'static str, title: &str, rows: &[(&str, Tally, f64)]) -> Table 
         ("largest", "largest"),
         ("pair", "of bodies"),
     ];
-    let mut table = Table::new(id, title, &columns);
+    let mut table = Table::with_columns(id, title, &columns);
     for (name, tally, scale) in rows {
         let mean = tally.largest.map(|_| tally.mean() * scale);
         table.row([

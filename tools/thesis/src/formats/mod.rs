@@ -1,5 +1,6 @@
 //! Measures the sizes of a step's numbers, and their errors in 16-bit formats.
 
+mod figures;
 mod numbers;
 mod tally;
 
@@ -20,7 +21,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use self::numbers::{AS_STREAMED, Numbers, SUMS};
 pub(crate) use self::numbers::{EACH_ONCE, numbers};
 pub(crate) use self::tally::{Loss, Sizes};
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part, shown};
 use crate::narrow::NarrowFormat;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
@@ -44,7 +45,7 @@ pub(crate) static FORMATS: Measured<FormatsArgs> = Measured {
     id: "formats",
     thesis: "§4.6.2, Figures 4.5 to 4.8",
     about: "The sizes of a step's numbers, and their errors in 16-bit formats",
-    opens_board: true,
+    boards: Boards::Any,
     run: measure,
 };
 
@@ -92,6 +93,11 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
         Some(path) => part.fact("input", path.display().to_string()),
         None => part.fact("scene", format!("{}, step {}", args.scene.text(), args.step)),
     }
+    let named = match &args.input {
+        Some(path) => format!("the step in {}", shown(path)),
+        None => format!("step {} of our pile of {}", args.step, args.scene.text()),
+    };
+    figures::add(&mut part, &kinds, &named);
     let counts = [bodies.len(), collisions.len()].map(|count| grouped(count as u64));
     part.fact("step", format!("{} bodies, {} collisions", counts[0], counts[1]));
     let config = match &args.input {
@@ -135,7 +141,7 @@ fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<Step>, Failur
 
 /// The numbers of each kind and of each sum.
 fn of_kinds(kinds: &[Numbers]) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "numbers",
         "The numbers of a step, and their errors in 16 bits",
         &[
@@ -192,7 +198,7 @@ fn cells<'a>(name: &str, values: impl Iterator<Item = &'a f32> + Clone) -> Vec<C
 /// The numbers as streamed, by powers of ten.
 fn by_size(kinds: &[Numbers]) -> Table {
     let columns = [("from", "from"), ("numbers", "numbers"), ("percent", "%")];
-    let mut table = Table::new("sizes", format!("{} by size", AS_STREAMED.name), &columns);
+    let mut table = Table::with_columns("sizes", format!("{} by size", AS_STREAMED.name), &columns);
     let sizes = Sizes::of(AS_STREAMED.of(kinds));
     let percent = |part: u64| 100.0 * part as f64 / sizes.numbers.max(1) as f64;
     let zeros = std::iter::once(("0".to_owned(), sizes.zeros));

@@ -7,7 +7,10 @@ use crate::estimate::thesis::amdahl;
 use crate::estimate::thesis::recorded::{
     ACCELERATED_SHARE, CPU, Design, GPU, Platform, ZCU102_WATTS,
 };
-use crate::estimate::{Records, StepTime};
+use crate::estimate::{DESIGNS as ALL, Records, StepTime, thesis};
+use crate::experiment::Part;
+use crate::figure::{Figure as Chart, bars};
+use crate::index::Row;
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::Variant;
 
@@ -19,7 +22,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 }
 
 fn platforms() -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "platforms",
         "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
         &[
@@ -62,19 +65,19 @@ fn platforms() -> Table {
 }
 
 /// The figures that follow from one latency.
-pub(crate) struct Outcome {
-    pub(crate) ms: f64,
+struct Outcome {
+    ms: f64,
 }
 
 impl Outcome {
     fn joules(&self) -> f64 {
         ZCU102_WATTS * self.ms / 1e3
     }
-    pub(crate) fn speedup(&self, platform: &Platform) -> f64 {
+    fn speedup(&self, platform: &Platform) -> f64 {
         platform.latency_ms / self.ms
     }
     /// Computes with both energies unrounded, not with the printed ones.
-    pub(crate) fn energy(&self, platform: &Platform) -> f64 {
+    fn energy(&self, platform: &Platform) -> f64 {
         self.energy_at(platform.watts, platform)
     }
     /// The same with another power of the platform, W.
@@ -184,7 +187,7 @@ const FIGURES: [Figure; 13] = [
 ];
 
 fn against(scene: &Scene) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "comparison",
         "Against the thesis' GPU and CPU (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)",
         &[
@@ -274,4 +277,83 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
         sustained,
         kind.cell(),
     ]);
+}
+
+/// Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
+pub(super) fn figures(part: &mut Part) {
+    let caption = "Times of GTX 980 and i7-3770 are the thesis' records; the accelerator's are our model's, on \
+         the thesis' step. The thesis' figure has bars of its first design, and its text prints no numbers \
+         of it. Our naive converts contacts within the passes, the thesis in a kernel of its own whose \
+         rows go through memory: ours is a lower bound of its first design. mixed, windowed and \
+         windowed16 are this project's own, and no boards: no hardware has them, and no processor \
+         of this class can order collisions for the last two.";
+    let (figure, row) = over_both(
+        ("figure-6-1", "§6.5, Figure 6.1"),
+        ["speed-up", "Speed-up of each design over GPU and CPU", caption],
+        |design| [design.speedup.gpu, design.speedup.cpu],
+        Outcome::speedup,
+    );
+    part.figure(figure, [row]);
+    let caption = "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured. \
+         The table of the comparison has the thermal design powers of its Tables 6.2 and 6.3 beside them.";
+    let (figure, row) = over_both(
+        ("figure-6-2", "§6.5, Figure 6.2"),
+        ["energy efficiency", "Energy efficiency of each design over GPU and CPU", caption],
+        |design| [design.energy.gpu, design.energy.cpu],
+        Outcome::energy,
+    );
+    part.figure(figure, [row]);
+}
+
+/// A chart of a figure over GPU and CPU, as printed and as ours, and its row: both designs of the thesis.
+fn over_both(
+    id: (&'static str, &'static str),
+    [what, title, caption]: [&str; 3],
+    recorded: fn(&Design) -> [f64; 2],
+    ours: fn(&Outcome, &Platform) -> f64,
+) -> (Chart, Row) {
+    let names = ["GPU, recorded", "GPU, modelled", "CPU, recorded", "CPU, modelled"];
+    let (mut groups, mut values) = (Vec::new(), Vec::new());
+    let [mut printed, mut modelled] = [Vec::new(), Vec::new()];
+    for profile in ALL {
+        let variant = profile.default_variant();
+        let time = StepTime::new(&variant, Records::Packed, &thesis::step(), Bandwidth::Unlimited);
+        let outcome = Outcome { ms: time.seconds * 1e3 };
+        let [gpu, cpu] = [&GPU, &CPU].map(|platform| ours(&outcome, platform));
+        let of_thesis = Design::of(profile).map(recorded);
+        let [of_gpu, of_cpu] = [0, 1].map(|of| of_thesis.map(|both| both[of]));
+        groups.push(profile.name.to_owned());
+        values.push(vec![of_gpu, Some(gpu), of_cpu, Some(cpu)]);
+        if let Some([of_gpu, of_cpu]) = of_thesis {
+            printed.push(format!("{} {of_gpu:.2} and {of_cpu:.2}", profile.name));
+            modelled.push(format!("{} {gpu:.2} and {cpu:.2}", profile.name));
+        }
+    }
+    let svg = bars("times", &groups, &names.map(str::to_owned), &values);
+    let figure = Chart::new(id, title, svg, caption).modelled();
+    let subject = format!("{what} over GPU and CPU");
+    let row = figure.row(subject, printed.join(", "), modelled.join(", "));
+    (figure, row)
+}
+
+#[cfg(test)]
+mod tests {
+    use pgs_interface::profile::{FLOAT, HALF};
+
+    use super::*;
+
+    #[test]
+    fn the_models_figures_are_near_the_recorded_ones() {
+        for design in [Design::of(&FLOAT), Design::of(&HALF)] {
+            let design = design.expect("a design of the thesis");
+            let variant = design.profile.default_variant();
+            let time =
+                StepTime::new(&variant, Records::Packed, &thesis::step(), Bandwidth::Unlimited);
+            let outcome = Outcome { ms: time.seconds * 1e3 };
+            for (platform, printed) in [(&GPU, design.speedup.gpu), (&CPU, design.speedup.cpu)] {
+                let ours = outcome.speedup(platform);
+                assert!((ours / printed - 1.0).abs() < 0.02, "{printed} and {ours}");
+            }
+        }
+    }
 }

@@ -19,22 +19,7 @@ fn uses(scene: &Scene) -> impl Iterator<Item = (&pgs_interface::profile::Variant
 }
 
 fn footprint(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "memory",
-        "On-chip memory, MiB (§4.4.2)",
-        &[
-            ("profile", "profile"),
-            ("mib", "MiB"),
-            ("thesis_mib", "thesis"),
-            ("difference_percent", "difference"),
-            ("with_positions_mib", "with positions"),
-            ("thesis_with_positions_mib", "thesis"),
-            ("with_positions_difference_percent", "difference"),
-            ("fits", "of 4.0 MiB"),
-            ("collisions_that_fit", "room for collisions"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("memory", "On-chip memory, MiB (§4.4.2)");
     for (variant, memory) in uses(scene) {
         let design = Design::of(variant.profile);
         let beside = |bytes: u64, theirs: fn(&Design) -> f64| {
@@ -48,16 +33,20 @@ fn footprint(scene: &Scene) -> Table {
         let [more, thesis_more, off_more] =
             beside(memory.with_positions(), |design| design.mebibytes_with_positions);
         table.row([
-            text(variant.profile.name),
-            ours,
-            thesis,
-            off,
-            more,
-            thesis_more,
-            off_more,
-            text(if memory.fits() { "fits" } else { "does not fit" }),
-            Cell::Whole(MemoryUse::collisions_beside(variant, scene.step.bodies)),
-            Kind::Exact.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("mib", "MiB", ours),
+            ("thesis_mib", "thesis", thesis),
+            ("difference_percent", "difference", off),
+            ("with_positions_mib", "with positions", more),
+            ("thesis_with_positions_mib", "thesis", thesis_more),
+            ("with_positions_difference_percent", "difference", off_more),
+            ("fits", "of 4.0 MiB", text(if memory.fits() { "fits" } else { "does not fit" })),
+            (
+                "collisions_that_fit",
+                "room for collisions",
+                Cell::Whole(MemoryUse::collisions_beside(variant, scene.step.bodies)),
+            ),
+            ("kind", "kind", Kind::Exact.cell()),
         ]);
     }
     table.note(
@@ -68,36 +57,21 @@ fn footprint(scene: &Scene) -> Table {
 }
 
 fn arrays(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "arrays",
-        "On-chip memory by array",
-        &[
-            ("profile", "profile"),
-            ("array", "array"),
-            ("row_bytes", "row"),
-            ("rows", "rows"),
-            ("copies", "copies"),
-            ("bytes", "bytes"),
-            ("ideal_blocks", "by bits"),
-            ("shaped_blocks", "by shape"),
-            ("shape", "shape"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("arrays", "On-chip memory by array");
     for (variant, memory) in uses(scene) {
         for array in &memory.arrays {
             let shaped = array.shaped_blocks();
             table.row([
-                text(variant.profile.name),
-                text(array.array.name()),
-                Cell::Whole(array.row_bytes.into()),
-                Cell::Whole(array.rows),
-                Cell::Whole(array.copies.into()),
-                Cell::Whole(array.bytes()),
-                Cell::Whole(array.ideal_blocks()),
-                Cell::Whole(shaped.blocks),
-                text(format!("{} x {}", shaped.shape.rows, shaped.shape.bits)),
-                Kind::Modelled.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("array", "array", text(array.array.name())),
+                ("row_bytes", "row", Cell::Whole(array.row_bytes.into())),
+                ("rows", "rows", Cell::Whole(array.rows)),
+                ("copies", "copies", Cell::Whole(array.copies.into())),
+                ("bytes", "bytes", Cell::Whole(array.bytes())),
+                ("ideal_blocks", "by bits", Cell::Whole(array.ideal_blocks())),
+                ("shaped_blocks", "by shape", Cell::Whole(shaped.blocks)),
+                ("shape", "shape", text(format!("{} x {}", shaped.shape.rows, shaped.shape.bits))),
+                ("kind", "kind", Kind::Modelled.cell()),
             ]);
         }
     }
@@ -111,22 +85,7 @@ fn arrays(scene: &Scene) -> Table {
 }
 
 fn blocks(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "blocks",
-        "BRAM_18K of 1,824 (T6.4, T6.8)",
-        &[
-            ("profile", "profile"),
-            ("ideal_blocks", "by bits"),
-            ("ideal_percent", "share"),
-            ("shaped_blocks", "by shape"),
-            ("shaped_percent", "share"),
-            ("thesis_percent", "thesis"),
-            ("ideal_difference_percent", "by bits off"),
-            ("shaped_difference_percent", "by shape off"),
-            ("shaped_fit", "fits by shape"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("blocks", "BRAM_18K of 1,824 (T6.4, T6.8)");
     let percent = |blocks: u64| blocks as f64 / BLOCKS as f64 * 100.0;
     let share = |blocks: u64| Cell::Share(percent(blocks));
     for (variant, memory) in uses(scene) {
@@ -136,16 +95,16 @@ fn blocks(scene: &Scene) -> Table {
         };
         let (ideal, shaped) = (memory.ideal_blocks(), memory.shaped_blocks());
         table.row([
-            text(variant.profile.name),
-            Cell::Whole(ideal),
-            share(ideal),
-            Cell::Whole(shaped),
-            share(shaped),
-            thesis.map_or(Cell::Missing, Cell::Share),
-            off(ideal),
-            off(shaped),
-            text(yes_or_no(shaped <= BLOCKS)),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("ideal_blocks", "by bits", Cell::Whole(ideal)),
+            ("ideal_percent", "share", share(ideal)),
+            ("shaped_blocks", "by shape", Cell::Whole(shaped)),
+            ("shaped_percent", "share", share(shaped)),
+            ("thesis_percent", "thesis", thesis.map_or(Cell::Missing, Cell::Share)),
+            ("ideal_difference_percent", "by bits off", off(ideal)),
+            ("shaped_difference_percent", "by shape off", off(shaped)),
+            ("shaped_fit", "fits by shape", text(yes_or_no(shaped <= BLOCKS))),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
     }
     table.note(
@@ -156,7 +115,7 @@ fn blocks(scene: &Scene) -> Table {
 }
 
 fn logic(scene: &Scene) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::with_columns(
         "logic",
         "Logic, percent of the device (T6.4, T6.8)",
         &[
@@ -193,20 +152,7 @@ fn logic(scene: &Scene) -> Table {
 
 /// Stream widths against the ports, and required bandwidth against the memory's.
 pub(super) fn streams(scene: &Scene) -> Vec<Table> {
-    let mut table = Table::new(
-        "streams",
-        "Streams against ports and memory while a pass runs",
-        &[
-            ("profile", "profile"),
-            ("widths", "widths, bits"),
-            ("ports", "HP ports of 4"),
-            ("fits", "fits"),
-            ("gb_per_second", "GB/s"),
-            ("of_peak_percent", "of 17.07"),
-            ("of_sustained_percent", "of 12.8"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("streams", "Streams against ports and memory while a pass runs");
     for variant in &scene.variants {
         let demand = StreamDemand::new(variant);
         let share = |bandwidth| match bandwidth {
@@ -216,14 +162,14 @@ pub(super) fn streams(scene: &Scene) -> Vec<Table> {
         let widths: Vec<String> =
             variant.profile.mm2s_widths.iter().map(ToString::to_string).collect();
         table.row([
-            text(variant.profile.name),
-            text(widths.join(" + ")),
-            Cell::Whole(demand.ports as u64),
-            text(yes_or_no(demand.fits)),
-            Cell::Number(demand.rate / 1e9, 2),
-            share(Bandwidth::ZCU102_PEAK),
-            share(Bandwidth::ZCU102_SUSTAINED),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("widths", "widths, bits", text(widths.join(" + "))),
+            ("ports", "HP ports of 4", Cell::Whole(demand.ports as u64)),
+            ("fits", "fits", text(yes_or_no(demand.fits))),
+            ("gb_per_second", "GB/s", Cell::Number(demand.rate / 1e9, 2)),
+            ("of_peak_percent", "of 17.07", share(Bandwidth::ZCU102_PEAK)),
+            ("of_sustained_percent", "of 12.8", share(Bandwidth::ZCU102_SUSTAINED)),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
     }
     table.note(format!(

@@ -1,11 +1,12 @@
 //! The cost of a step by formula, beside every table of the thesis, without running anything.
 
-pub(crate) mod comparison;
+mod comparison;
 mod data;
 mod euler;
 mod memory;
 mod mixed;
 mod ports;
+mod rows;
 mod scene;
 mod step;
 mod warm;
@@ -22,7 +23,8 @@ use serde_json::json;
 
 use self::scene::Scene;
 use crate::estimate::{DESIGNS, StepShape, thesis};
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
+use crate::session::Session;
 use crate::table::Table;
 
 const HELP: &str = "\
@@ -81,14 +83,17 @@ impl StepArgs {
     }
 
     /// The tables of this step.
-    fn part(&self, tables: Tables) -> Result<Part, Failure> {
+    fn part(&self, id: &str, tables: Tables) -> Result<Part, Failure> {
         let scene = self.scene();
         let tables = tables(&scene);
         if tables.is_empty() {
             let error = format!("there is nothing about {} here", self.profile);
             return Err(Failure::input(error).next("ask for another --profile, or for all"));
         }
-        let mut part = Part::of(tables);
+        // The thesis has its own step and its own designs alone.
+        let of_thesis = scene.is_thesis_step() && self.profile == ALL && !self.world_inertia;
+        let rows = if of_thesis { rows::of(id, &tables)? } else { Vec::new() };
+        let mut part = Part { rows, ..Part::of(tables) };
         part.fact("step", self.head(&scene));
         let step = &scene.step;
         part.data = json!({
@@ -131,116 +136,75 @@ impl StepArgs {
 /// Tables by formula.
 type Tables = fn(&Scene) -> Vec<Table>;
 
-/// Experiments that only calculate, with the functions of their tables.
-pub(crate) static FORMULAS: [(Measured<StepArgs>, Tables); 10] = [
-    (
-        Measured {
-            id: "step",
-            thesis: "Tables 6.4 and 6.8",
-            about: "Cycles and time of a step, and what world inertia costs",
-            opens_board: false,
-            run: |args, _| args.part(step::tables),
-        },
-        step::tables,
+/// An experiment that only calculates.
+const fn formula(
+    id: &'static str,
+    thesis: &'static str,
+    about: &'static str,
+    run: fn(&StepArgs, &Session) -> Result<Part, Failure>,
+) -> Measured<StepArgs> {
+    Measured { id, thesis, about, boards: Boards::None, run }
+}
+
+/// All of them.
+pub(crate) static FORMULAS: [Measured<StepArgs>; 10] = [
+    formula(
+        "step",
+        "Tables 6.4 and 6.8",
+        "Cycles and time of a step, and what world inertia costs",
+        |args, _| args.part("step", step::tables),
     ),
-    (
-        Measured {
-            id: "mixed",
-            thesis: "§7.3",
-            about: "A design of ours, mixed, against float",
-            opens_board: false,
-            run: |args, _| args.part(mixed::tables),
-        },
-        mixed::tables,
+    formula("mixed", "§7.3", "A design of ours, mixed, against float", |args, _| {
+        args.part("mixed", mixed::tables)
+    }),
+    formula(
+        "windowed",
+        "§4.7, §7.3",
+        "Two designs that stream the collisions once, against float",
+        |args, _| args.part("windowed", windowed::tables),
     ),
-    (
-        Measured {
-            id: "windowed",
-            thesis: "§4.7, §7.3",
-            about: "Two designs that stream the collisions once, against float",
-            opens_board: false,
-            run: |args, _| args.part(windowed::tables),
+    formula("data", "§4.4.1, Tables 4.1 to 4.6", "Words in and out", |args, _| {
+        args.part("data", data::tables)
+    }),
+    formula("memory", "§4.4.2, Tables 6.4 and 6.8", "On-chip memory and logic", |args, _| {
+        args.part("memory", memory::tables)
+    }),
+    formula("streams", "§5.4.2", "Stream widths and memory bandwidth", |args, _| {
+        args.part("streams", memory::streams)
+    }),
+    formula("ports", "§5.4.3, §5.5", "Block RAM ports and the initiation interval", |args, _| {
+        args.part("ports", ports::tables)
+    }),
+    formula("warm", "§2.2.3", "The cost of a warm start", |args, _| {
+        args.part("warm", warm::tables)
+    }),
+    formula(
+        "comparison",
+        "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
+        "Speed-up and energy against GPU and CPU",
+        |args, _| {
+            let mut part = args.part("comparison", comparison::tables)?;
+            comparison::figures(&mut part);
+            Ok(part)
         },
-        windowed::tables,
     ),
-    (
-        Measured {
-            id: "data",
-            thesis: "§4.4.1, Tables 4.1 to 4.6",
-            about: "Words in and out",
-            opens_board: false,
-            run: |args, _| args.part(data::tables),
-        },
-        data::tables,
-    ),
-    (
-        Measured {
-            id: "memory",
-            thesis: "§4.4.2, Tables 6.4 and 6.8",
-            about: "On-chip memory and logic",
-            opens_board: false,
-            run: |args, _| args.part(memory::tables),
-        },
-        memory::tables,
-    ),
-    (
-        Measured {
-            id: "streams",
-            thesis: "§5.4.2",
-            about: "Stream widths and memory bandwidth",
-            opens_board: false,
-            run: |args, _| args.part(memory::streams),
-        },
-        memory::streams,
-    ),
-    (
-        Measured {
-            id: "ports",
-            thesis: "§5.4.3, §5.5",
-            about: "Block RAM ports and the initiation interval",
-            opens_board: false,
-            run: |args, _| args.part(ports::tables),
-        },
-        ports::tables,
-    ),
-    (
-        Measured {
-            id: "warm",
-            thesis: "§2.2.3",
-            about: "The cost of a warm start",
-            opens_board: false,
-            run: |args, _| args.part(warm::tables),
-        },
-        warm::tables,
-    ),
-    (
-        Measured {
-            id: "comparison",
-            thesis: "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
-            about: "Speed-up and energy against GPU and CPU",
-            opens_board: false,
-            run: |args, _| args.part(comparison::tables),
-        },
-        comparison::tables,
-    ),
-    (
-        Measured {
-            id: "euler",
-            thesis: "§2.1.3, Figure 2.6",
-            about: "Explicit integration of a fall",
-            opens_board: false,
-            run: |args, _| args.part(euler::tables),
-        },
-        euler::tables,
-    ),
+    formula("euler", "§2.1.3, Figure 2.6", "Explicit integration of a fall", |args, _| {
+        let mut part = args.part("euler", euler::tables)?;
+        euler::figures(&mut part);
+        Ok(part)
+    }),
 ];
 
-/// All tables of the thesis' step, for the report.
-pub(crate) fn thesis_tables() -> Vec<Table> {
-    let scene = Scene {
-        step: thesis::step(),
-        variants: DESIGNS.iter().map(|profile| profile.default_variant()).collect(),
-        bandwidths: BANDWIDTHS.to_vec(),
+/// The parts of the thesis' step.
+#[cfg(test)]
+pub(crate) fn thesis_parts() -> Vec<Part> {
+    let args = StepArgs {
+        collisions: None,
+        bodies: None,
+        profile: ALL.to_owned(),
+        world_inertia: false,
+        bandwidth: None,
     };
-    FORMULAS.iter().flat_map(|(_, tables)| tables(&scene)).collect()
+    let session = Session::new(&pgs_command::common::CommonArgs::emulated());
+    FORMULAS.iter().map(|formula| (formula.run)(&args, &session).expect("tables")).collect()
 }

@@ -17,35 +17,21 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 }
 
 fn arrays(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "ports",
-        "On-chip accesses of one issue, and the limit of the ports",
-        &[
-            ("profile", "profile"),
-            ("array", "array"),
-            ("collisions", "collisions"),
-            ("reads", "reads"),
-            ("writes", "writes"),
-            ("copies", "copies"),
-            ("accesses", "busiest copy"),
-            ("pump", "pump"),
-            ("interval", "cycles"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table =
+        Table::new("ports", "On-chip accesses of one issue, and the limit of the ports");
     for variant in &scene.variants {
         for ports in PortAccount::new(variant).arrays {
             table.row([
-                text(variant.profile.name),
-                text(ports.array.name()),
-                Cell::Whole(ports.collisions.into()),
-                Cell::Whole((ports.reads * ports.collisions).into()),
-                Cell::Whole((ports.writes * ports.collisions).into()),
-                Cell::Whole(ports.copies.into()),
-                Cell::Whole(ports.accesses().into()),
-                Cell::Whole(ports.pump.into()),
-                Cell::Whole(ports.interval().into()),
-                Kind::Exact.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("array", "array", text(ports.array.name())),
+                ("collisions", "collisions", Cell::Whole(ports.collisions.into())),
+                ("reads", "reads", Cell::Whole((ports.reads * ports.collisions).into())),
+                ("writes", "writes", Cell::Whole((ports.writes * ports.collisions).into())),
+                ("copies", "copies", Cell::Whole(ports.copies.into())),
+                ("accesses", "busiest copy", Cell::Whole(ports.accesses().into())),
+                ("pump", "pump", Cell::Whole(ports.pump.into())),
+                ("interval", "cycles", Cell::Whole(ports.interval().into())),
+                ("kind", "kind", Kind::Exact.cell()),
             ]);
         }
     }
@@ -57,29 +43,21 @@ fn arrays(scene: &Scene) -> Table {
 }
 
 fn intervals(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "interval",
-        "Initiation interval, cycles an issue",
-        &[
-            ("profile", "profile"),
-            ("by_ports", "by ports"),
-            ("by_streams", "by streams"),
-            ("claimed", "claimed"),
-            ("collisions", "collisions an issue"),
-            ("justified", "justified"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("interval", "Initiation interval, cycles an issue");
     for variant in &scene.variants {
         let account = PortAccount::new(variant);
         table.row([
-            text(variant.profile.name),
-            Cell::Whole(account.by_ports().into()),
-            Cell::Whole(account.by_streams.into()),
-            Cell::Whole(account.claimed.into()),
-            Cell::Whole(variant.profile.collisions_per_issue.into()),
-            text(yes_or_no(account.claimed >= account.smallest())),
-            Kind::Exact.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("by_ports", "by ports", Cell::Whole(account.by_ports().into())),
+            ("by_streams", "by streams", Cell::Whole(account.by_streams.into())),
+            ("claimed", "claimed", Cell::Whole(account.claimed.into())),
+            (
+                "collisions",
+                "collisions an issue",
+                Cell::Whole(variant.profile.collisions_per_issue.into()),
+            ),
+            ("justified", "justified", text(yes_or_no(account.claimed >= account.smallest()))),
+            ("kind", "kind", Kind::Exact.cell()),
         ]);
     }
     table
@@ -106,20 +84,7 @@ fn access(ports: &PortUse, access: &Access) -> String {
 }
 
 fn schedule(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "schedule",
-        "Schedule of the ports, by cycle of the interval",
-        &[
-            ("profile", "profile"),
-            ("array", "array"),
-            ("copy", "copy"),
-            ("cycle", "cycle"),
-            ("clock", "clock"),
-            ("port_a", "port A"),
-            ("port_b", "port B"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("schedule", "Schedule of the ports, by cycle of the interval");
     for variant in &scene.variants {
         for ports in PortAccount::new(variant).arrays {
             let mut slots = ports.schedule().slots;
@@ -132,14 +97,14 @@ fn schedule(scene: &Scene) -> Table {
                     text(found.map_or("idle".to_owned(), |found| access(&ports, &found)))
                 };
                 table.row([
-                    text(variant.profile.name),
-                    text(ports.array.name()),
-                    Cell::Whole((first.copy + 1).into()),
-                    Cell::Whole((first.cycle + 1).into()),
-                    Cell::Whole((first.phase + 1).into()),
-                    port(0),
-                    port(1),
-                    Kind::Exact.cell(),
+                    ("profile", "profile", text(variant.profile.name)),
+                    ("array", "array", text(ports.array.name())),
+                    ("copy", "copy", Cell::Whole((first.copy + 1).into())),
+                    ("cycle", "cycle", Cell::Whole((first.cycle + 1).into())),
+                    ("clock", "clock", Cell::Whole((first.phase + 1).into())),
+                    ("port_a", "port A", port(0)),
+                    ("port_b", "port B", port(1)),
+                    ("kind", "kind", Kind::Exact.cell()),
                 ]);
             }
         }
@@ -156,15 +121,6 @@ fn alternatives(scene: &Scene) -> Table {
     let mut table = Table::new(
         "copies",
         "Cycles an issue by the velocities' ports, with other copies and clocks",
-        &[
-            ("profile", "profile"),
-            ("pump", "pump"),
-            ("one", "1 copy"),
-            ("two", "2 copies"),
-            ("three", "3 copies"),
-            ("many", "1,000 copies"),
-            ("kind", "kind"),
-        ],
     );
     for variant in &scene.variants {
         let account = PortAccount::new(variant);
@@ -172,13 +128,13 @@ fn alternatives(scene: &Scene) -> Table {
         for pump in [1, 2] {
             let cycles = |copies| Cell::Whole(velocities.with(copies, pump).interval().into());
             table.row([
-                text(variant.profile.name),
-                Cell::Whole(pump.into()),
-                cycles(1),
-                cycles(2),
-                cycles(3),
-                cycles(1_000),
-                Kind::Exact.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("pump", "pump", Cell::Whole(pump.into())),
+                ("one", "1 copy", cycles(1)),
+                ("two", "2 copies", cycles(2)),
+                ("three", "3 copies", cycles(3)),
+                ("many", "1,000 copies", cycles(1_000)),
+                ("kind", "kind", Kind::Exact.cell()),
             ]);
         }
     }
@@ -196,27 +152,16 @@ fn alternatives(scene: &Scene) -> Table {
 }
 
 fn load(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "load",
-        "Loading the velocities: cycles by streams and by ports",
-        &[
-            ("profile", "profile"),
-            ("array", "array"),
-            ("by_streams", "by streams"),
-            ("by_ports", "by ports of one bank"),
-            ("banks", "banks needed"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("load", "Loading the velocities: cycles by streams and by ports");
     for variant in &scene.variants {
         for load in PortAccount::new(variant).load(variant, scene.step.bodies) {
             table.row([
-                text(variant.profile.name),
-                text(load.array.name()),
-                Cell::Whole(load.by_streams),
-                Cell::Whole(load.by_ports),
-                Cell::Whole(load.banks),
-                Kind::Exact.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("array", "array", text(load.array.name())),
+                ("by_streams", "by streams", Cell::Whole(load.by_streams)),
+                ("by_ports", "by ports of one bank", Cell::Whole(load.by_ports)),
+                ("banks", "banks needed", Cell::Whole(load.banks)),
+                ("kind", "kind", Kind::Exact.cell()),
             ]);
         }
     }

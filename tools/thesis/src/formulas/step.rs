@@ -14,41 +14,33 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 }
 
 fn cycles(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "cycles",
-        "Cycles of a step by formula (T6.4, T6.8)",
-        &[
-            ("profile", "profile"),
-            ("records", "records"),
-            ("load", "load"),
-            ("pass", "one pass"),
-            ("fill", "fill"),
-            ("integration", "integration"),
-            ("integration_fill", "its fill"),
-            ("total", "total"),
-            ("thesis", "thesis"),
-            ("difference_percent", "difference"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("cycles", "Cycles of a step by formula (T6.4, T6.8)");
     for variant in &scene.variants {
         let design = Design::of(variant.profile);
         for records in Records::ALL {
             let cycles = StepCycles::new(variant, records, &scene.step);
             table.row([
-                text(variant.profile.name),
-                text(records.name()),
-                Cell::Whole(cycles.load),
-                Cell::Whole(cycles.pass),
-                Cell::Whole(cycles.fill),
-                Cell::Whole(cycles.integration()),
-                Cell::Whole(cycles.integration_fill),
-                Cell::Whole(cycles.total),
-                design.map_or(Cell::Missing, |design| Cell::Whole(design.cycles)),
-                design.map_or(Cell::Missing, |design| {
-                    scene.difference(cycles.total as f64, design.cycles as f64)
-                }),
-                Kind::Modelled.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("records", "records", text(records.name())),
+                ("load", "load", Cell::Whole(cycles.load)),
+                ("pass", "one pass", Cell::Whole(cycles.pass)),
+                ("fill", "fill", Cell::Whole(cycles.fill)),
+                ("integration", "integration", Cell::Whole(cycles.integration())),
+                ("integration_fill", "its fill", Cell::Whole(cycles.integration_fill)),
+                ("total", "total", Cell::Whole(cycles.total)),
+                (
+                    "thesis",
+                    "thesis",
+                    design.map_or(Cell::Missing, |design| Cell::Whole(design.cycles)),
+                ),
+                (
+                    "difference_percent",
+                    "difference",
+                    design.map_or(Cell::Missing, |design| {
+                        scene.difference(cycles.total as f64, design.cycles as f64)
+                    }),
+                ),
+                ("kind", "kind", Kind::Modelled.cell()),
             ]);
         }
     }
@@ -73,23 +65,7 @@ fn cycles(scene: &Scene) -> Table {
 }
 
 fn times(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "time",
-        "Time of a step by memory bandwidth",
-        &[
-            ("profile", "profile"),
-            ("records", "records"),
-            ("bandwidth", "bandwidth"),
-            ("bytes", "bytes moved"),
-            ("ms", "ms"),
-            ("load_limit", "load by"),
-            ("pass_limit", "passes by"),
-            ("integration_limit", "integration by"),
-            ("thesis_ms", "thesis ms"),
-            ("difference_percent", "difference"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("time", "Time of a step by memory bandwidth");
     for variant in &scene.variants {
         let design = Design::of(variant.profile);
         for records in Records::ALL {
@@ -99,19 +75,27 @@ fn times(scene: &Scene) -> Table {
                 let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH];
                 let design = design.filter(|_| stated.contains(bandwidth));
                 table.row([
-                    text(variant.profile.name),
-                    text(records.name()),
-                    text(bandwidth_text(*bandwidth)),
-                    Cell::Whole(time.bytes),
-                    Cell::Number(time.seconds * 1e3, 3),
-                    text(time.load.limit.name()),
-                    text(time.pass.limit.name()),
-                    text(time.integration.limit.name()),
-                    design.map_or(Cell::Missing, |design| Cell::Number(design.latency_ms, 2)),
-                    design.map_or(Cell::Missing, |design| {
-                        scene.difference(time.seconds * 1e3, design.latency_ms)
-                    }),
-                    Kind::Modelled.cell(),
+                    ("profile", "profile", text(variant.profile.name)),
+                    ("records", "records", text(records.name())),
+                    ("bandwidth", "bandwidth", text(bandwidth_text(*bandwidth))),
+                    ("bytes", "bytes moved", Cell::Whole(time.bytes)),
+                    ("ms", "ms", Cell::Number(time.seconds * 1e3, 3)),
+                    ("load_limit", "load by", text(time.load.limit.name())),
+                    ("pass_limit", "passes by", text(time.pass.limit.name())),
+                    ("integration_limit", "integration by", text(time.integration.limit.name())),
+                    (
+                        "thesis_ms",
+                        "thesis ms",
+                        design.map_or(Cell::Missing, |design| Cell::Number(design.latency_ms, 2)),
+                    ),
+                    (
+                        "difference_percent",
+                        "difference",
+                        design.map_or(Cell::Missing, |design| {
+                            scene.difference(time.seconds * 1e3, design.latency_ms)
+                        }),
+                    ),
+                    ("kind", "kind", Kind::Modelled.cell()),
                 ]);
             }
         }
@@ -126,20 +110,8 @@ fn times(scene: &Scene) -> Table {
 }
 
 fn world_inertia(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "inertia",
-        "What the world inertia of every body costs, records as streamed",
-        &[
-            ("profile", "profile"),
-            ("cycles_without", "cycles"),
-            ("cycles_with", "with it"),
-            ("difference_percent", "difference"),
-            ("mib_without", "MiB on chip"),
-            ("mib_with", "with it"),
-            ("fit", "fits"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table =
+        Table::new("inertia", "What the world inertia of every body costs, records as streamed");
     for variant in &scene.variants {
         let both = [Inertia::Isotropic, Inertia::World].map(|inertia| {
             let variant = Variant { inertia, ..*variant };
@@ -149,14 +121,14 @@ fn world_inertia(scene: &Scene) -> Table {
         });
         let [(without, memory_without), (with, memory_with)] = both;
         table.row([
-            text(variant.profile.name),
-            Cell::Whole(without),
-            Cell::Whole(with),
-            difference(with as f64, without as f64),
-            Cell::Number(mib(memory_without.block_ram()), 2),
-            Cell::Number(mib(memory_with.block_ram()), 2),
-            text(yes_or_no(memory_with.fits())),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("cycles_without", "cycles", Cell::Whole(without)),
+            ("cycles_with", "with it", Cell::Whole(with)),
+            ("difference_percent", "difference", difference(with as f64, without as f64)),
+            ("mib_without", "MiB on chip", Cell::Number(mib(memory_without.block_ram()), 2)),
+            ("mib_with", "with it", Cell::Number(mib(memory_with.block_ram()), 2)),
+            ("fit", "fits", text(yes_or_no(memory_with.fits()))),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
     }
     table

@@ -7,20 +7,7 @@ use crate::table::{Cell, Kind, Table, text};
 
 /// The table, if one of the profiles has a warm start.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
-    let mut table = Table::new(
-        "warm",
-        "Warm start: impulses in and out",
-        &[
-            ("profile", "profile"),
-            ("applied", "impulses are applied"),
-            ("cycles", "cycles without"),
-            ("more_cycles_percent", "cycles more"),
-            ("bytes", "bytes without"),
-            ("more_bytes_percent", "bytes more"),
-            ("out_percent", "out of it"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("warm", "Warm start: impulses in and out");
     for variant in &scene.variants {
         for (way, name) in [
             (WarmStart::OwnPass, "in a pass in front of each kind"),
@@ -29,14 +16,18 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
             let Some(cost) = WarmCost::new(variant, way, &scene.step) else { continue };
             let percent = |part: u64, of: u64| Cell::Share(part as f64 / of.max(1) as f64 * 100.0);
             table.row([
-                text(variant.profile.name),
-                text(name),
-                Cell::Whole(cost.cycles),
-                percent(cost.more_cycles, cost.cycles),
-                Cell::Whole(cost.bytes),
-                percent(cost.more_in + cost.more_out, cost.bytes),
-                percent(cost.more_out, cost.bytes),
-                Kind::Modelled.cell(),
+                ("profile", "profile", text(variant.profile.name)),
+                ("applied", "impulses are applied", text(name)),
+                ("cycles", "cycles without", Cell::Whole(cost.cycles)),
+                ("more_cycles_percent", "cycles more", percent(cost.more_cycles, cost.cycles)),
+                ("bytes", "bytes without", Cell::Whole(cost.bytes)),
+                (
+                    "more_bytes_percent",
+                    "bytes more",
+                    percent(cost.more_in + cost.more_out, cost.bytes),
+                ),
+                ("out_percent", "out of it", percent(cost.more_out, cost.bytes)),
+                ("kind", "kind", Kind::Modelled.cell()),
             ]);
         }
     }

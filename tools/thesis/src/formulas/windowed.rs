@@ -26,37 +26,23 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
     let mut table = Table::new(
         "window_cycles",
         "Collisions streamed once: cycles of a step whose order needs all of the delay lines",
-        &[
-            ("profile", "profile"),
-            ("contact_units", "contact units"),
-            ("friction_units", "friction"),
-            ("slot", "slot"),
-            ("stream", "first pass"),
-            ("behind", "last behind it"),
-            ("fill", "fill"),
-            ("passes", "solver"),
-            ("load", "load beside it"),
-            ("integration", "integration"),
-            ("integration_fill", "its fill"),
-            ("kind", "kind"),
-        ],
     );
     for (variant, design) in designs {
         let step = WindowStep::longest(design, scene.step);
         let Some(cycles) = WindowCycles::new(variant, &step) else { continue };
         table.row([
-            text(variant.profile.name),
-            Cell::Whole(design.contact_units.into()),
-            Cell::Whole(design.friction_units.into()),
-            Cell::Whole(cycles.slot),
-            Cell::Whole(cycles.stream),
-            Cell::Whole(cycles.behind),
-            Cell::Whole(cycles.fill),
-            Cell::Whole(cycles.passes),
-            Cell::Whole(cycles.load),
-            Cell::Whole(cycles.integration),
-            Cell::Whole(cycles.integration_fill),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("contact_units", "contact units", Cell::Whole(design.contact_units.into())),
+            ("friction_units", "friction", Cell::Whole(design.friction_units.into())),
+            ("slot", "slot", Cell::Whole(cycles.slot)),
+            ("stream", "first pass", Cell::Whole(cycles.stream)),
+            ("behind", "last behind it", Cell::Whole(cycles.behind)),
+            ("fill", "fill", Cell::Whole(cycles.fill)),
+            ("passes", "solver", Cell::Whole(cycles.passes)),
+            ("load", "load beside it", Cell::Whole(cycles.load)),
+            ("integration", "integration", Cell::Whole(cycles.integration)),
+            ("integration_fill", "its fill", Cell::Whole(cycles.integration_fill)),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
         table.note(format!(
             "{}: (C + {} x {}) x {} + {}. An order with a longest span of s entries needs a lag of \
@@ -79,22 +65,8 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
 }
 
 fn gains(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
-    let mut table = Table::new(
-        "window_gains",
-        "Collisions streamed once, against float, records as streamed",
-        &[
-            ("profile", "profile"),
-            ("bytes", "bytes a step"),
-            ("float_bytes", "float's"),
-            ("bytes_ratio", "a fraction of"),
-            ("ms_unlimited", "ms"),
-            ("ms_sustained", "ms at 12.8 GB/s"),
-            ("float_ms_sustained", "float's"),
-            ("mib", "MiB on chip"),
-            ("float_mib", "float's"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table =
+        Table::new("window_gains", "Collisions streamed once, against float, records as streamed");
     for (variant, _) in designs {
         let float = Variant { inertia: variant.inertia, ..FLOAT.default_variant() };
         let bytes = |v: &Variant| StepTraffic::new(v, Records::Streamed, &scene.step).bytes();
@@ -108,16 +80,16 @@ fn gains(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
         };
         let ratio = bytes(&float) as f64 / bytes(variant).max(1) as f64;
         table.row([
-            text(variant.profile.name),
-            Cell::Whole(bytes(variant)),
-            Cell::Whole(bytes(&float)),
-            text(format!("1/{ratio:.2}")),
-            ms(variant, Bandwidth::Unlimited),
-            ms(variant, Bandwidth::ZCU102_SUSTAINED),
-            ms(&float, Bandwidth::ZCU102_SUSTAINED),
-            on_chip(variant),
-            on_chip(&float),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("bytes", "bytes a step", Cell::Whole(bytes(variant))),
+            ("float_bytes", "float's", Cell::Whole(bytes(&float))),
+            ("bytes_ratio", "a fraction of", text(format!("1/{ratio:.2}"))),
+            ("ms_unlimited", "ms", ms(variant, Bandwidth::Unlimited)),
+            ("ms_sustained", "ms at 12.8 GB/s", ms(variant, Bandwidth::ZCU102_SUSTAINED)),
+            ("float_ms_sustained", "float's", ms(&float, Bandwidth::ZCU102_SUSTAINED)),
+            ("mib", "MiB on chip", on_chip(variant)),
+            ("float_mib", "float's", on_chip(&float)),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
     }
     table.note(
@@ -130,28 +102,18 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
     let mut table = Table::new(
         "window_logic",
         "Collisions streamed once: logic, percent of the XCZU9EG, extrapolated from the thesis",
-        &[
-            ("profile", "profile"),
-            ("from", "from"),
-            ("units", "units of a kind"),
-            ("dsp", "DSP"),
-            ("flip_flops", "flip-flops"),
-            ("lookup_tables", "lookup tables"),
-            ("fits", "fits"),
-            ("kind", "kind"),
-        ],
     );
     for (variant, _) in designs {
         let Some(logic) = WindowLogic::new(variant) else { continue };
         table.row([
-            text(variant.profile.name),
-            text(format!("{} {}", logic.from.profile.name, logic.from.results)),
-            Cell::Whole(logic.units.into()),
-            Cell::Share(logic.dsp.into()),
-            Cell::Share(logic.flip_flops.into()),
-            Cell::Share(logic.lookup_tables.into()),
-            text(yes_or_no(logic.fits())),
-            Kind::Modelled.cell(),
+            ("profile", "profile", text(variant.profile.name)),
+            ("from", "from", text(format!("{} {}", logic.from.profile.name, logic.from.results))),
+            ("units", "units of a kind", Cell::Whole(logic.units.into())),
+            ("dsp", "DSP", Cell::Share(logic.dsp.into())),
+            ("flip_flops", "flip-flops", Cell::Share(logic.flip_flops.into())),
+            ("lookup_tables", "lookup tables", Cell::Share(logic.lookup_tables.into())),
+            ("fits", "fits", text(yes_or_no(logic.fits()))),
+            ("kind", "kind", Kind::Modelled.cell()),
         ]);
         let left = 100_u32.saturating_sub(logic.lookup_tables);
         table.note(if logic.fits() {

@@ -1,6 +1,7 @@
 //! Measures each order of a step's collisions, for every depth of the pipeline.
 
 mod cost;
+mod live;
 mod rows;
 mod source;
 
@@ -15,7 +16,7 @@ use zynq_pgs::order::{IssueWindow, OrderError};
 
 use self::rows::Measured as Rows;
 use self::source::Source;
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part, shown};
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 
@@ -38,7 +39,7 @@ pub(crate) static ORDER: Measured<OrderArgs> = Measured {
     id: "order",
     thesis: "§4.7, Algorithm 3",
     about: "The cost of each order of the collisions: hazards, empty slots, live bodies, host time",
-    opens_board: true,
+    boards: Boards::Any,
     run: measure,
 };
 
@@ -93,6 +94,13 @@ fn measure(args: &OrderArgs, session: &Session) -> Result<Part, Failure> {
     let measured = rows::measure(&source, &windows, args.runs).map_err(refused)?;
     let input = source.input();
     let mut part = Part::of(vec![table(&measured)]);
+    let step = match &args.input {
+        Some(path) => format!("the step in {}", shown(path)),
+        None => source.name.clone(),
+    };
+    for window in windows.iter().take(1) {
+        live::add(&mut part, &input, *window, &step).map_err(refused)?;
+    }
     let scene = format!(
         "{}: {} collisions of {} moving bodies, {:.2} a body",
         source.name,
@@ -122,40 +130,27 @@ fn refused(error: OrderError) -> Failure {
 }
 
 fn table(measured: &Rows) -> Table {
-    let mut table = Table::new(
-        "orders",
-        "The cost of each order",
-        &[
-            ("order", "order"),
-            ("depth", "depth\nslots"),
-            ("hazards", "hazards"),
-            ("hazard_percent", "hazards\n%"),
-            ("lost_updates", "lost\nupdates"),
-            ("empty", "empty\nslots"),
-            ("empty_percent", "empty\n%"),
-            ("slots", "slots"),
-            ("most_alive", "alive\nmost"),
-            ("longest_span", "span\nlongest"),
-            ("mean_span", "span\nmean"),
-            ("host_ns_per_collision", "host\nns/coll."),
-        ],
-    );
+    let mut table = Table::new("orders", "The cost of each order");
     let count = |number: usize| Cell::Whole(number as u64);
     for row in &measured.rows {
         let report = &row.report;
         table.row([
-            text(&row.order),
-            Cell::Whole(row.depth.into()),
-            count(report.hazards),
-            Cell::Number(report.hazard_share() * 100.0, 2),
-            count(report.lost_updates),
-            count(report.empty),
-            Cell::Number(report.empty_share() * 100.0, 3),
-            count(report.slots),
-            count(report.most_alive),
-            count(report.longest_span),
-            Cell::Number(report.mean_span, 0),
-            Cell::known(row.host_ns, |ns| Cell::Number(ns, 1)),
+            ("order", "order", text(&row.order)),
+            ("depth", "depth\nslots", Cell::Whole(row.depth.into())),
+            ("hazards", "hazards", count(report.hazards)),
+            ("hazard_percent", "hazards\n%", Cell::Number(report.hazard_share() * 100.0, 2)),
+            ("lost_updates", "lost\nupdates", count(report.lost_updates)),
+            ("empty", "empty\nslots", count(report.empty)),
+            ("empty_percent", "empty\n%", Cell::Number(report.empty_share() * 100.0, 3)),
+            ("slots", "slots", count(report.slots)),
+            ("most_alive", "alive\nmost", count(report.most_alive)),
+            ("longest_span", "span\nlongest", count(report.longest_span)),
+            ("mean_span", "span\nmean", Cell::Number(report.mean_span, 0)),
+            (
+                "host_ns_per_collision",
+                "host\nns/coll.",
+                Cell::known(row.host_ns, |ns| Cell::Number(ns, 1)),
+            ),
         ]);
     }
     table

@@ -2,13 +2,13 @@
 
 use scene::SplitMix64;
 use zynq_pgs::order::{
-    Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule, Ties,
-    colour_count,
+    Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule,
 };
 
 use super::cost;
 use super::source::Source;
-use pgs_command::permutation::shuffled;
+use crate::permutation::body_by_body::{self, Ties};
+use crate::permutation::{Making, colours, shuffled};
 
 /// Seed of the random order; any number does.
 const SEED: u64 = 20_260_101;
@@ -32,6 +32,8 @@ pub(super) struct Measured {
 /// The origin of an order.
 enum Kind {
     Made(Order),
+    /// Made here, the same at every depth.
+    Permuted(Making),
     /// A given order, the same at every depth.
     Fixed(Schedule),
 }
@@ -46,12 +48,25 @@ pub(super) fn measure(
     let mut rows = Vec::new();
     let mut verify_ns = 0.0;
     let mut orderer = Orderer::new();
-    for (name, kind) in kinds(source)? {
+    // The driver's check of the input, which the orders made here need.
+    for window in windows.iter().take(1) {
+        orderer.order(&input, Order::AsGiven, *window)?;
+    }
+    for (name, kind) in kinds(source) {
         let mut schedule = Schedule::default();
         let mut host_ns = None;
         for (place, window) in windows.iter().copied().enumerate() {
             match &kind {
                 Kind::Fixed(fixed) => schedule.clone_from(fixed),
+                Kind::Permuted(making) => {
+                    if place == 0 {
+                        let cost = || {
+                            schedule = in_order(making(&input));
+                            Ok(())
+                        };
+                        host_ns = Some(cost::per_collision(&input, runs, cost)?);
+                    }
+                }
                 Kind::Made(order) => {
                     // Only orders without hazards depend on the depth.
                     if place == 0 || order.is_hazard_free() {
@@ -82,23 +97,30 @@ fn verified(
     cost::per_collision(input, runs, || checker.verify(schedule, input, window))
 }
 
-fn kinds(source: &Source) -> Result<Vec<(String, Kind)>, OrderError> {
+/// The schedule of a permutation.
+fn in_order(order: Vec<u32>) -> Schedule {
+    order.into_iter().map(Some).collect()
+}
+
+fn kinds(source: &Source) -> Vec<(String, Kind)> {
     let input = source.input();
-    let thesis = |ties| Kind::Made(Order::BodyByBody(ties));
-    let fixed = |order: Vec<u32>| Kind::Fixed(order.into_iter().map(Some).collect());
-    let colours = colour_count(&input)?;
+    let colours = colours::order(&input).1;
     let mut kinds = vec![("as given".to_owned(), Kind::Made(Order::AsGiven))];
     if let Some(order) = &source.gpu_order {
-        kinds.push(("Bullet's GPU batches".to_owned(), fixed(order.clone())));
+        kinds.push(("Bullet's GPU batches".to_owned(), Kind::Fixed(in_order(order.clone()))));
     }
+    let random = shuffled(&mut SplitMix64::new(SEED), input.pairs.len());
+    let thesis: [(&str, Making); 3] = [
+        ("thesis, lowest index", |input| body_by_body::order(input, Ties::LowestIndex)),
+        ("thesis, oldest", |input| body_by_body::order(input, Ties::Oldest)),
+        ("thesis, newest", |input| body_by_body::order(input, Ties::Newest)),
+    ];
+    kinds.push(("random".to_owned(), Kind::Fixed(in_order(random))));
+    kinds.extend(thesis.map(|(name, making)| (name.to_owned(), Kind::Permuted(making))));
     kinds.extend([
-        ("random".to_owned(), fixed(shuffled(&mut SplitMix64::new(SEED), input.pairs.len()))),
-        ("thesis, lowest index".to_owned(), thesis(Ties::LowestIndex)),
-        ("thesis, oldest".to_owned(), thesis(Ties::Oldest)),
-        ("thesis, newest".to_owned(), thesis(Ties::Newest)),
-        (format!("{colours} colours"), Kind::Made(Order::Colours)),
+        (format!("{colours} colours"), Kind::Permuted(|input| colours::order(input).0)),
         ("hazard-free".to_owned(), Kind::Made(Order::HazardFree)),
         ("hazard-free-nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
     ]);
-    Ok(kinds)
+    kinds
 }

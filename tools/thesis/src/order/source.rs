@@ -9,9 +9,9 @@ use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::OrderArgs;
+use crate::permutation;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
-use pgs_command::permutation;
 use pgs_command::pile;
 use pgs_command::step_input;
 use step_folder::folder::Folder;

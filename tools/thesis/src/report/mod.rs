@@ -1,11 +1,7 @@
 //! All experiments at once: the thesis' tables and figures as a page, as Markdown and as JSON.
 
-mod figures;
 mod page;
 mod parts;
-mod step;
-mod studies;
-mod tables;
 mod text;
 mod write;
 
@@ -88,17 +84,14 @@ pub(crate) fn run(
 mod tests {
     use super::*;
     use crate::command::tests::parsed;
-    use pgs_command::common::BoardName;
 
-    /// A real board, which the report does not take.
-    const REAL: BoardName = BoardName::Devmem;
+    /// A grid that `gather` refuses at once: an earlier refusal came before it.
+    const TOO_LARGE: &str = "--grid 60x60x60";
 
-    /// Reports a board that `gather` refuses at once: an earlier refusal came before it.
-    fn failure(out: &std::path::Path, board: &BoardName, options: &str) -> Failure {
+    fn failure(out: &std::path::Path, options: &str) -> Failure {
         let line = format!("pgs thesis --all --out {} {options}", out.display());
         let args = parsed(&line).expect("words");
-        let common = CommonArgs { board: board.clone(), ..CommonArgs::emulated() };
-        args.run(&common, &mut Vec::new()).expect_err("a refusal")
+        args.run(&CommonArgs::emulated(), &mut Vec::new()).expect_err("a refusal")
     }
 
     #[test]
@@ -109,16 +102,16 @@ mod tests {
         let taken = folder.path().join("taken");
         std::fs::create_dir_all(taken.join("thesis.html")).expect("a folder with the file's name");
         for out in [&file, &file.join("below"), &taken] {
-            let failure = failure(out, &REAL, "");
+            let failure = failure(out, TOO_LARGE);
             let path = out.to_str().expect("text");
             assert!(failure.chain().contains(path), "{}", failure.chain());
             let mut said = Vec::new();
             let _ = failure.report(&mut said);
             let said = String::from_utf8(said).expect("text");
-            assert!(said.contains("--out") && !said.contains("--board"), "{said}");
+            assert!(said.contains("--out") && !said.contains("--grid"), "{said}");
         }
-        let failure = failure(&folder.path().join("new"), &REAL, "");
-        assert!(failure.chain().contains("cannot use a real one"), "{}", failure.chain());
+        let failure = failure(&folder.path().join("new"), TOO_LARGE);
+        assert!(failure.chain().contains("bodies with the ground"), "{}", failure.chain());
     }
 
     /// The arrays of `--input` are read while the page is written.
@@ -132,19 +125,19 @@ mod tests {
         let options = format!("--input {}", input.display());
         for file in ["thesis.json", "figures/figure.svg"] {
             std::fs::hard_link(input.join("a.npy"), out.join(file)).expect("a link");
-            let said = failure(&out, &REAL, &options).chain();
+            let said = failure(&out, &options).chain();
             assert!(said.contains(file) && said.contains(" are one file"), "{said}");
             std::fs::remove_file(out.join(file)).expect("removed");
         }
-        let refused = failure(&out, &REAL, &options);
-        assert!(refused.chain().contains("cannot use a real one"), "{}", refused.chain());
+        let refused = failure(&out, &options);
+        assert!(refused.chain().contains(".npy"), "{}", refused.chain());
     }
 
     #[test]
     fn a_grid_that_no_board_takes_is_refused_before_it_is_built() {
         let folder = tempfile::tempdir().expect("a folder");
         for grid in ["180x1000x180", "60x60x60"] {
-            let failure = failure(folder.path(), &BoardName::Emulated, &format!("--grid {grid}"));
+            let failure = failure(folder.path(), &format!("--grid {grid}"));
             assert!(failure.chain().contains("bodies with the ground"), "{}", failure.chain());
         }
     }

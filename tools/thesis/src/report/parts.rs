@@ -1,25 +1,28 @@
-//! Gathers the parts of the report, with progress.
+//! Runs all experiments, with progress.
 
+use std::path::Path;
 use std::time::Duration;
 
+use clap::Command;
 use indicatif::{ProgressBar, ProgressStyle};
+use scene::Grid;
 
 use super::AllArgs;
-use super::figures;
-use super::step::Step;
-use super::studies::Effort;
-use super::tables;
-use crate::experiment::Part;
-use crate::formulas::thesis_tables;
+use crate::command::experiments;
+use crate::experiment::{Part, shown};
 use crate::session::Session;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Cause, Failure};
 use pgs_command::interrupt::Interrupt;
+use pgs_command::options::scenes::DROP;
 
 /// Time between two pictures of the spinner.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Everything that the report shows.
+/// Depth of the pipeline at which orders are compared, issue slots.
+const DEPTH: u32 = 64;
+
+/// Everything that the page shows.
 #[derive(Debug)]
 pub(super) struct Report {
     /// The step that was measured.
@@ -30,7 +33,7 @@ pub(super) struct Report {
     pub(super) part: Part,
 }
 
-/// Measures and draws all parts.
+/// Runs all experiments.
 pub(super) fn gather(
     args: &AllArgs,
     common: &CommonArgs,
@@ -42,52 +45,135 @@ pub(super) fn gather(
     }
     bar.enable_steady_tick(TICK);
     let session = Session::within(common, interrupt.clone(), bar.clone());
-    let gathered = session.emulated().and_then(|common| of_all(args, &common, &session, &bar));
+    let gathered = of_all(args, &session, &bar);
     bar.finish_and_clear();
     gathered
 }
 
-fn of_all(
-    args: &AllArgs,
-    common: &CommonArgs,
-    session: &Session,
-    bar: &ProgressBar,
-) -> Result<Report, Failure> {
-    let effort = Effort::new(args, session);
-    let about = |what: &'static str| {
-        bar.set_message(what);
-        effort.go_on()
-    };
-    about("the step to measure")?;
-    let step = match &args.input {
-        Some(path) => Step::folder(path)?,
-        None => Step::of_pile(args, common, &effort)?,
-    };
-    about("time steps")?;
-    let mut part = figures::time_step::part(&effort)?;
-    part.append(figures::euler::part()?);
-    part.append(figures::separation::part());
-    about("stopping rules and shares of a step")?;
-    part.append(figures::solver::part(&effort)?);
-    about("the pile")?;
-    part.append(figures::pile::part(&effort, common)?);
-    part.tables = thesis_tables();
-    part.rows.extend(tables::of_chapter_4(&part.tables)?);
-    about("orders of the collisions")?;
-    part.append(figures::orders::part(&effort)?);
-    about("the input in 16 bits")?;
-    part.append(figures::formats::part(&step)?);
-    about("16 bits against float")?;
-    part.append(figures::half::part(&effort)?);
-    about("live bodies of each order")?;
-    part.append(figures::live::part(&step)?);
-    about("stages of a step")?;
-    part.append(figures::stages::part(common)?);
-    part.append(figures::ladder::part()?);
-    part.rows.extend(tables::of_chapter_6(&part.tables)?);
-    part.append(figures::designs::part()?);
+fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report, Failure> {
+    let mut part = Part::default();
+    for (id, words) in args.runs() {
+        bar.set_message(id);
+        let (command, one) = run(id, &words, session)?;
+        if session.is_interrupted() || !one.complete {
+            return Err(Failure::new(Cause::Output, "interrupted: no page was written"));
+        }
+        let mut one = one;
+        one.printed_by(&command);
+        // The page has the tables of the formulas; the others stand in its figures.
+        if !FORMULAS.contains(&id) {
+            one.tables.clear();
+        }
+        part.append(one);
+    }
     part.sort();
-    Ok(Report { step: step.name, given: args.input.is_some(), quick: args.quick, part })
+    Ok(Report { step: args.subject(), given: args.input.is_some(), quick: args.quick, part })
+}
+
+/// The formulas, in the order of their tables on the page.
+const FORMULAS: [&str; 10] = [
+    "step",
+    "mixed",
+    "windowed",
+    "data",
+    "memory",
+    "streams",
+    "ports",
+    "warm",
+    "comparison",
+    "euler",
+];
+
+/// Runs an experiment with these options; also the command that repeats it.
+fn run(id: &str, words: &[String], session: &Session) -> Result<(String, Part), Failure> {
+    let named = words.iter().map(|word| quoted(&shown(Path::new(word))));
+    let command: Vec<String> =
+        ["pgs thesis", id].into_iter().map(str::to_owned).chain(named).collect();
+    let command = command.join(" ");
+    let refused = |error: &dyn std::fmt::Display| {
+        Failure::new(Cause::Input, format!("{command} is refused: {error}"))
+    };
+    let all = experiments();
+    let experiment = all.iter().find(|each| each.id() == id);
+    let experiment = experiment.ok_or_else(|| refused(&"there is no such experiment"))?;
+    let matches = experiment
+        .arguments(Command::new(experiment.id()))
+        .try_get_matches_from(std::iter::once(&id.to_owned()).chain(words))
+        .map_err(|error| refused(&error))?;
+    let part = experiment.run(&matches, session)?;
+    Ok((command, part))
+}
+
+/// A word as a shell reads it.
+fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "_./=,:+-".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+impl AllArgs {
+    /// The step that is measured, for people.
+    fn subject(&self) -> String {
+        match &self.input {
+            Some(path) => format!("the step in {}", shown(path)),
+            None => format!("step {} of our pile of {} cubes", self.step, self.pile()),
+        }
+    }
+
+    /// The grid that the user gave; otherwise this small one for a quick page, and the thesis'.
+    fn grid(&self, [x, y, z]: [u16; 3]) -> Grid {
+        let small = || Grid::new(x, y, z).ok().filter(|_| self.quick);
+        self.grid.or_else(small).unwrap_or_default()
+    }
+
+    /// The experiments with the options of each, the one that is refused soonest first.
+    fn runs(&self) -> Vec<(&'static str, Vec<String>)> {
+        let (pile, before) = (self.pile(), self.step.saturating_sub(1));
+        // The same step, by an option of each experiment.
+        let step = |options: String| match &self.input {
+            Some(path) => vec!["--input".to_owned(), path.display().to_string()],
+            None => words(&format!("--grid {pile} {options}")),
+        };
+        let from = || step(format!("--from {before} --steps 1"));
+        let with = |mut all: Vec<String>, more: &str| {
+            all.extend(words(more));
+            all
+        };
+        let (small, steps) = (self.grid([12, 12, 12]), if self.quick { 200 } else { 240 });
+        let many = || words(&format!("--grid {small} --drop {LONG_DROP} --steps {steps}"));
+        let either = |quick, slow| words(if self.quick { quick } else { slow });
+        let mut runs = vec![
+            ("formats", step(format!("--step {}", self.step))),
+            (
+                "order",
+                with(
+                    step(format!("--drop {DROP} --steps {before}")),
+                    &format!("--depth {DEPTH} --runs 1"),
+                ),
+            ),
+            ("time-step", either("--grid 4x4x4", "--grid 8x8x8 --seconds 4")),
+            ("stopping", either("--passes 32", "--passes 128 --grid 10x10x10")),
+            ("split", words(&format!("--grid {small}"))),
+            ("pile", words(&format!("--grid {}", self.grid([18, 15, 18])))),
+            ("determinism", with(from(), if self.quick { "--pairs 5" } else { "--pairs 20" })),
+            ("determinism", with(many(), "--pairs 1")),
+            ("half", from()),
+            ("half", many()),
+            ("stages", Vec::new()),
+            ("ladder", Vec::new()),
+        ];
+        runs.extend(FORMULAS.map(|id| (id, Vec::new())));
+        runs
+    }
+}
+
+/// The height from which a pile falls for many steps, m: the collisions come one behind the other.
+const LONG_DROP: u32 = 5;
+
+fn words(text: &str) -> Vec<String> {
+    text.split_whitespace().map(str::to_owned).collect()
 }
 
 #[cfg(test)]
@@ -175,6 +261,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_commands_of_the_page_are_those_that_it_runs() {
+        let session =
+            Session::within(&CommonArgs::emulated(), Interrupt::install(), ProgressBar::hidden());
+        let (command, _) = run("ladder", &words("--collisions 9"), &session).expect("a part");
+        assert_eq!(command, "pgs thesis ladder --collisions 9");
+        let refused = run("formats", &["--no".to_owned()], &session).expect_err("refused");
+        let said = refused.chain();
+        assert!(said.contains("pgs thesis formats --no is refused"), "{said}");
+        let input = ["--input", "/home/somebody/two_cubes"].map(str::to_owned);
+        let missing = run("formats", &input, &session).expect_err("no folder").chain();
+        assert!(missing.contains("/home/somebody/two_cubes"), "{missing}");
+        assert_eq!(quoted("../a/step_1"), "../a/step_1");
+        assert_eq!(quoted("my step's"), "'my step'\\''s'");
+    }
+
     /// The document that a command prints.
     fn printed(command: &str) -> Value {
         let common = CommonArgs { json: true, ..CommonArgs::emulated() };
@@ -187,15 +289,14 @@ mod tests {
     /// The rows of a report on steps that are found in the same report again, by the command of each.
     #[test]
     fn rows_of_formats_and_orders_have_the_figures_that_their_commands_print() {
-        let (args, common) = (&options(), CommonArgs::emulated());
-        let session = Session::within(&common, Interrupt::install(), ProgressBar::hidden());
-        let effort = Effort::new(args, &session);
-        let step = Step::of_pile(args, &common, &effort).expect("a step");
-        let mut part = figures::formats::part(&step).expect("figures");
-        part.append(figures::orders::part(&effort).expect("figures"));
         let percent = |value: &Value| value.as_f64().expect("a number");
         let (mut once, mut often, mut documents) = (0, 0, Vec::new());
-        for row in &part.rows {
+        let of = |row: &&Row| {
+            ["pgs thesis formats", "pgs thesis determinism"]
+                .iter()
+                .any(|verb| row.command.starts_with(verb))
+        };
+        for row in REPORT.part.rows.iter().filter(of) {
             if !documents.iter().any(|(command, _)| *command == row.command) {
                 documents.push((row.command.clone(), printed(&row.command)));
             }

@@ -3,10 +3,12 @@
 pub(crate) mod determinism;
 pub(crate) mod half;
 pub(crate) mod ladder;
+pub(crate) mod pile;
 pub(crate) mod recorded;
 mod run;
 pub(crate) mod split;
 mod spread;
+pub(crate) mod stages;
 mod start;
 pub(crate) mod stopping;
 pub(crate) mod time_step;

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+use crate::figure::{Axis, Drawn, Series, lines};
+use pgs_command::numbers::number;
+
 /// A comparison of two sets of positions in the thesis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct RecordedDeviation {
@@ -13,6 +16,32 @@ pub(crate) struct RecordedDeviation {
     pub(crate) mean_percent: [f64; 2],
     /// Share of the positions that deviate by less than 1 %, if it is given.
     pub(crate) under_1_percent_share: Option<f64>,
+}
+
+impl RecordedDeviation {
+    /// The thesis' figure in words.
+    pub(crate) fn text(&self) -> String {
+        let Self { thesis, subject, mean_percent: [low, high], under_1_percent_share } = self;
+        let mean = if (low - high).abs() > 0.0 { format!("{low} to {high}") } else { number(*low) };
+        let under = under_1_percent_share
+            .map_or_else(String::new, |share| format!(", {} % under 1 %", number(share * 100.0)));
+        format!("{thesis}, {subject}: mean {mean} %{under}")
+    }
+
+    /// A chart of the shares of positions that deviate by less, with the thesis' point at 1 %.
+    pub(crate) fn spread(&self, mut series: Vec<Series>) -> String {
+        if let Some(share) = self.under_1_percent_share.map(|share| share * 100.0) {
+            let name = format!("{share:.2} % below 1 %, recorded");
+            series.push(Series::new(name, Drawn::Marked, vec![(1.0, share)]));
+        }
+        let (x, y) = ("deviation (eq. 4.1), %", "positions that deviate by less, %");
+        lines(Axis::log(x), Axis::linear(y), &series)
+    }
+}
+
+/// A share as percent.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.3} %", share * 100.0)
 }
 
 /// Two runs of the demo on a GPU.

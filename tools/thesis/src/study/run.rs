@@ -4,10 +4,10 @@ use scene::{Scene, kinetic_energy};
 use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use super::start::Start;
+use crate::permutation::{Arranger, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
-use pgs_command::permutation::{Arranger, Permutation};
 use step_folder::folder::Folder;
 
 /// The bodies and collisions of a run.

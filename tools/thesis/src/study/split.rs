@@ -12,12 +12,13 @@ use crate::estimate::thesis::recorded::{ACCELERATED_SHARE, CPU, DESIGNS, GPU};
 use clap::Args;
 use nix::time::{ClockId, clock_gettime};
 use scene::{Grid, Scene};
-use serde::Serialize;
 use yardstick::Yardstick;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
-use crate::experiment::{Measured, Part};
+use crate::experiment::{Boards, Measured, Part};
+use crate::figure::{Figure, bars};
+use crate::index::Row;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 use pgs_command::board;
@@ -46,7 +47,7 @@ pub(crate) static SPLIT: Measured<Options> = Measured {
     id: "split",
     thesis: "§4.4, equation 6.5",
     about: "The shares of collision search and response in a step, and what a faster response gains",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
@@ -69,7 +70,7 @@ pub(crate) struct Options {
 }
 
 /// The shares, and the gains.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) complete: bool,
     pub(crate) grid: String,
@@ -79,8 +80,6 @@ pub(crate) struct Outcome {
     pub(crate) collisions: usize,
     /// Medians; none if Ctrl-C came before the first measured step.
     pub(crate) median: Option<Times>,
-    /// The response's share of search and response, from the medians.
-    pub(crate) response_share: Option<f64>,
     /// The smallest and the largest share of a step.
     pub(crate) response_share_range: Option<[f64; 2]>,
     /// The thesis' share.
@@ -90,7 +89,7 @@ pub(crate) struct Outcome {
 }
 
 /// Times of one step, ms.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Times {
     pub(crate) search_ms: f64,
     pub(crate) response_ms: f64,
@@ -101,7 +100,7 @@ pub(crate) struct Times {
 }
 
 /// The gain of a whole step.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Gain {
     pub(crate) response: String,
     /// The factor of the response.
@@ -161,7 +160,6 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         bodies: scene.bodies().len(),
         collisions: scene.collisions().len(),
         median,
-        response_share: median.as_ref().map(Times::response_share),
         response_share_range: range,
         recorded_share: ACCELERATED_SHARE,
         gains: median.as_ref().map(gains).unwrap_or_default(),
@@ -266,7 +264,7 @@ impl Outcome {
             samples.len()
         );
         let tables = self.median.iter().flat_map(|times| [times.table(), self.of_gains()]);
-        let mut part = Part::of(tables.collect()).with(self);
+        let mut part = Part::of(tables.collect());
         part.complete = self.complete;
         part.fact("pile", pile);
         if let Some((times, [least, most])) = self.median.as_ref().zip(self.response_share_range) {
@@ -279,29 +277,56 @@ impl Outcome {
                 100.0 * self.recorded_share,
             );
             part.fact("share", text);
+            let (figure, row) = self.figure(times.response_share());
+            part.figure(figure, [row]);
         }
         part
     }
 
-    fn of_gains(&self) -> Table {
-        let mut table = Table::new(
-            "gains",
-            "The whole step by equation 6.5",
-            &[
-                ("response", "response"),
-                ("factor", "factor\ns"),
-                ("whole_with_recorded_share", "whole\np = 0.6"),
-                ("whole_with_measured_share", "whole\nmeasured"),
-                ("recorded", "thesis"),
-            ],
+    /// The shares beside the thesis'.
+    fn figure(&self, response: f64) -> (Figure, Row) {
+        let both = |response: f64| [100.0 - 100.0 * response, 100.0 * response];
+        let (recorded, ours) = (both(self.recorded_share), both(response));
+        let figure = Figure::new(
+            ("figure-shares", "§4.4"),
+            "Shares of collision search and collision response",
+            bars(
+                "% of both",
+                &["search", "response"].map(str::to_owned),
+                &["recorded", "measured"].map(str::to_owned),
+                &[0, 1].map(|part| vec![Some(recorded[part]), Some(ours[part])]),
+            ),
+            format!(
+                "a pile of {} cubes, in processor time of one thread of this host. The thesis names \
+                 neither its processor nor its program for the shares.",
+                self.grid
+            ),
         );
+        let shown = |[search, response]: [f64; 2], digits: usize| {
+            format!("{search:.digits$} % search, {response:.digits$} % response")
+        };
+        let on_host = format!("{}, on one core of this host", shown(ours, 1));
+        let row = figure.row("shares of a step", shown(recorded, 0), on_host);
+        (figure, row)
+    }
+
+    fn of_gains(&self) -> Table {
+        let mut table = Table::new("gains", "The whole step by equation 6.5");
         for gain in &self.gains {
             table.row([
-                text(&gain.response),
-                Cell::Number(gain.factor, 2),
-                Cell::Number(gain.whole_with_recorded_share, 2),
-                Cell::Number(gain.whole_with_measured_share, 2),
-                Cell::known(gain.recorded, |gain| Cell::Number(gain, 2)),
+                ("response", "response", text(&gain.response)),
+                ("factor", "factor\ns", Cell::Number(gain.factor, 2)),
+                (
+                    "whole_with_recorded_share",
+                    "whole\np = 0.6",
+                    Cell::Number(gain.whole_with_recorded_share, 2),
+                ),
+                (
+                    "whole_with_measured_share",
+                    "whole\nmeasured",
+                    Cell::Number(gain.whole_with_measured_share, 2),
+                ),
+                ("recorded", "thesis", Cell::known(gain.recorded, |gain| Cell::Number(gain, 2))),
             ]);
         }
         table
@@ -311,7 +336,7 @@ impl Outcome {
 impl Times {
     fn table(&self) -> Table {
         let columns = [("part", "one step"), ("ms", "time\nms"), ("share_percent", "share\n%")];
-        let mut table = Table::new("shares", "Times of one step", &columns);
+        let mut table = Table::with_columns("shares", "Times of one step", &columns);
         let whole = self.search_ms + self.response_ms;
         for (name, time, shared) in [
             ("search (measured)", self.search_ms, true),

@@ -9,14 +9,15 @@ use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Shape, StepParameters};
 
 use super::run::{Run, World};
+use crate::experiment::shown;
 use crate::formats::{EACH_ONCE, numbers};
+use crate::permutation::{self, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
-use pgs_command::permutation::{self, Permutation};
 use pgs_command::pile;
 use pgs_command::step_input;
 use scene::Scene;
@@ -174,6 +175,17 @@ impl<'a> Start<'a> {
                 )
             }
             None => format!("{}, {} steps", self.args.scene.text(), self.steps),
+        }
+    }
+
+    /// The steps of the runs, for the caption of a figure.
+    pub(super) fn subject(&self) -> String {
+        match (&self.args.input, self.args.from, self.steps) {
+            (Some(path), ..) => format!("the step in {}", shown(path)),
+            (None, from, 1) => {
+                format!("step {} of our pile of {}", from + 1, self.args.scene.text())
+            }
+            _ => format!("{} steps of our pile of {}", self.steps, self.args.scene.text()),
         }
     }
 

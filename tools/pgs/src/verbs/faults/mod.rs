@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
-use pgs_command::common::{AcceleratorChoice, CommonArgs};
+use pgs_command::common::{AcceleratorChoice, AcceleratorOptions, CommonArgs};
 use pgs_command::environment;
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::output::SCHEMA;
@@ -54,6 +54,8 @@ pub(crate) struct FaultsArgs {
     /// Print the fault of each cell, and try none.
     #[arg(long)]
     list: bool,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
 }
 
 /// The results of a profile's cells.

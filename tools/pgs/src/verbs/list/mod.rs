@@ -13,7 +13,7 @@ use zynq_pgs::platform::{
 
 use inventory::{Buffer, Node, explained, state, unreadable_json};
 use pgs_command::board;
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::output::SCHEMA;
 
@@ -33,6 +33,8 @@ pub(crate) struct ListArgs {
     /// Directory that holds the system's files, for tests.
     #[arg(long, hide = true, default_value = "/")]
     system_root: PathBuf,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
 }
 
 /// Lists the boards.

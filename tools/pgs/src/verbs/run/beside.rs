@@ -8,7 +8,6 @@ use zynq_pgs::{Accelerator, StepParameters};
 use super::row::{Row, step};
 use super::summary::FinalState;
 use pgs_command::output::table::Column;
-use pgs_command::permutation::Arranger;
 
 /// The columns that the scene adds to the table of the run.
 pub(super) const COLUMNS: [Column; 2] = [
@@ -20,8 +19,6 @@ pub(super) const COLUMNS: [Column; 2] = [
 pub(super) struct Cold {
     scene: Scene,
     parameters: StepParameters,
-    /// The order of the run.
-    arranger: Option<Arranger>,
     last: Option<Row>,
 }
 
@@ -42,14 +39,10 @@ pub(super) fn is_stepped(choice: Option<bool>, by_default: bool, has_sensors: bo
 
 impl Cold {
     /// A scene that is stepped with the parameters of the run, but for a warm start and frictions.
-    pub(super) fn new(
-        scene: Scene,
-        parameters: &StepParameters,
-        arranger: Option<Arranger>,
-    ) -> Self {
+    pub(super) fn new(scene: Scene, parameters: &StepParameters) -> Self {
         let parameters =
             parameters.with_warm_start(false).with_impulses_out(false).with_pair_friction(false);
-        Self { scene, parameters, arranger, last: None }
+        Self { scene, parameters, last: None }
     }
 
     /// Takes a step; none if Ctrl-C ended it.
@@ -58,8 +51,8 @@ impl Cold {
         number: u32,
         accelerator: &mut Accelerator,
     ) -> Result<Option<Beside>, zynq_pgs::Error> {
-        let Self { scene, parameters, arranger, last } = self;
-        let row = step(number, parameters, accelerator, scene, None, arranger.as_mut())?;
+        let Self { scene, parameters, last } = self;
+        let row = step(number, parameters, accelerator, scene, None)?;
         let of = |row: &Row| Beside { deepest: row.deepest, kinetic_energy: row.before_gravity };
         let beside = row.as_ref().map(of);
         if row.is_some() {
@@ -126,7 +119,7 @@ mod tests {
         let scene = Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).expect("a scene");
         let mut accelerator = Accelerator::open(OpenOptions::default()).expect("an emulated board");
         accelerator.set_shapes(scene.shapes()).expect("two shapes");
-        let mut cold = Cold::new(scene, &StepParameters::default(), None);
+        let mut cold = Cold::new(scene, &StepParameters::default());
         assert!(!cold.has_taken(1) && cold.end_text(1).is_none());
         cold.step(1, &mut accelerator).expect("no fault").expect("no Ctrl-C");
         assert!(cold.has_taken(1) && cold.end_text(1).is_some());

@@ -14,7 +14,6 @@ use pgs_command::options::bandwidth::bandwidth_text;
 use pgs_command::options::solver::time_step_text;
 use pgs_command::output::SCHEMA;
 use pgs_command::output::facts::fact;
-use pgs_command::permutation::Permutation;
 use step_folder::digest;
 
 /// The summary of the run; none before the first step.
@@ -91,7 +90,6 @@ pub(super) fn document(
     config["friction_iterations"] = parameters.friction_iterations.into();
     config["time_step_s"] = parameters.time_step.into();
     config["spin_damping"] = parameters.spin_damping.into();
-    config["permutation"] = args.ordering.permutation().map(Permutation::text).into();
     config["warm_start"] = parameters.warm_start.into();
     config["pair_friction"] = parameters.pair_friction.into();
     config["time_step"] = time_step_text(parameters.time_step).into();

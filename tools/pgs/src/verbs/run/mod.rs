@@ -25,7 +25,7 @@ use crate::bug_report::FaultArgs;
 use crate::footprint::Footprint;
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use pgs_command::board::{self, OpenBoard};
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::build::BuildArgs;
@@ -48,7 +48,6 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
-  pgs run --order random=1 --grid 10x10x10       another order in every step
   pgs run --profile half --format thesis16       the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
@@ -71,12 +70,15 @@ kinetic energy of the velocities that moved the bodies, which is 0 for a pile at
 step on the board, modelled for an emulated board; time of this machine. With --beside-cold the depth
 and the energy of the same scene without a warm start and with one friction, stepped beside it.";
 
+/// The end of the short help.
+const MORE: &str = "`pgs run --help` has all options, by subject, and examples.";
+
 /// Default rows of the table.
 const ROWS: u32 = 15;
 
 /// Step a pile dropped on the ground.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = MORE, after_long_help = EXAMPLES)]
 pub(crate) struct RunArgs {
     /// Steps to take [default: 120 for cubes, 600 for shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -91,8 +93,9 @@ pub(crate) struct RunArgs {
     wide: bool,
     #[command(flatten)]
     solver: SolverArgs,
-    /// Begin each step with 0.85 of the impulses of the last one, in one more pass of each kind
-    /// [default: on for --scene shapes]
+    /// Begin each step with the impulses of the last one
+    ///
+    /// With 0.85 of them, in one more pass of each kind [default: on for --scene shapes]
     #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     warm_start: Option<bool>,
     /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on for
@@ -108,6 +111,10 @@ pub(crate) struct RunArgs {
     ordering: OrderingArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
+    #[command(flatten)]
+    pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) accelerator: AcceleratorOptions,
     #[command(flatten)]
     faults: FaultArgs,
     #[command(flatten)]
@@ -176,8 +183,7 @@ impl RunArgs {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
         let wanted = beside::is_stepped(self.beside_cold, shown && !self.wide, has_sensors);
         let scene = || self.scene.build(&self.build.build());
-        let arranger = self.ordering.arranger(None);
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters, arranger))).transpose()
+        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
     }
 }
 
@@ -296,15 +302,13 @@ fn take_steps(
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
-    let mut arranger = args.ordering.arranger(None);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
         let tracing = tracing.filter(|(_, step)| *step == number).map(|(tracing, _)| tracing);
         if let Some(tracing) = tracing {
             tracing.begin();
         }
-        let (memory, arranger) = (memory.as_mut(), arranger.as_mut());
-        let row = step(number, parameters, &mut opened.accelerator, scene, memory, arranger);
+        let row = step(number, parameters, &mut opened.accelerator, scene, memory.as_mut());
         let traced = tracing.map(|tracing| {
             let row = row.as_ref().ok().and_then(Option::as_ref);
             tracing.end(row.map(|row| &row.report))
@@ -383,7 +387,7 @@ fn print_heading(
 ) -> io::Result<()> {
     opened.print(out)?;
     fact(out, "scene", &args.scene.text())?;
-    fact(out, "order", &order::with_reason(first, args.ordering.permutation()))?;
+    fact(out, "order", &order::with_reason(first))?;
     writeln!(out)?;
     match args.wide {
         true => heading(out, &ALL_COLUMNS)?,

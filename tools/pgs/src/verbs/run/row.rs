@@ -10,7 +10,6 @@ use pgs_command::board::is_cancelled;
 use pgs_command::numbers::{Bound, grouped};
 use pgs_command::output::table::Column;
 use pgs_command::output::{limit_text, milliseconds, report_json};
-use pgs_command::permutation::Arranger;
 
 /// Share of the last step's impulses that a warm step begins with (Bullet's).
 const WARM_FACTOR: f32 = 0.85;
@@ -126,26 +125,20 @@ impl Row {
 }
 
 /// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins with
-/// the impulses of the last one; an arranger puts the collisions in its order.
+/// the impulses of the last one.
 pub(super) fn step(
     number: u32,
     parameters: &StepParameters,
     accelerator: &mut Accelerator,
     scene: &mut Scene,
     memory: Option<&mut ContactMemory>,
-    arranger: Option<&mut Arranger>,
 ) -> Result<Option<Row>, zynq_pgs::Error> {
     let begin = Instant::now();
     scene.detect();
     let detect = begin.elapsed();
     let ground_pairs = scene.ground_pairs();
     let deepest = scene::penetration(scene.collisions()).largest;
-    let shapes = if arranger.is_some() { scene.shapes().to_vec() } else { Vec::new() };
     let (bodies, collisions) = scene.parts_mut();
-    let collisions = match arranger {
-        Some(arranger) => arranger.arrange(bodies, &shapes, collisions),
-        None => collisions,
-    };
     let stepped = match memory {
         None => accelerator.step(bodies, collisions, parameters),
         Some(memory) => {

@@ -12,14 +12,14 @@ use super::run::Run;
 use super::spread::Spread;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::histogram::Histogram;
+use crate::permutation::Permutation;
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
 use pgs_command::failure::Failure;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::is_sequential;
-use pgs_command::permutation::Permutation;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -45,7 +45,7 @@ pub(crate) static ORDERS: Measured<Options> = Measured {
     id: "determinism",
     thesis: "§4.5, §4.6.3, Figures 4.2 and 4.9",
     about: "The same steps with collisions in different orders",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
@@ -88,6 +88,8 @@ pub(crate) struct Outcome {
     pub(crate) recorded: [RecordedDeviation; 2],
     #[serde(skip)]
     start_text: String,
+    #[serde(skip)]
+    subject: String,
 }
 
 /// Two orders.
@@ -200,6 +202,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         pairs: of_pairs,
         recorded: [TWO_GPU_RUNS, FLOAT_AGAINST_GPU],
         start_text: start.text(),
+        subject: start.subject(),
     })
 }
 

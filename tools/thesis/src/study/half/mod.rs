@@ -1,5 +1,6 @@
 //! Thesis §4.6: the scene in sixteen bits beside float, after one step and after many.
 
+mod figures;
 mod show;
 mod splits;
 
@@ -14,7 +15,7 @@ use super::recorded::{HALF_AGAINST_FLOAT, RecordedDeviation};
 use super::run::Run;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving, unmoved_share};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::histogram::Histogram;
 use crate::narrow::carried;
 use crate::session::Session;
@@ -43,7 +44,7 @@ pub(crate) static HALF: Measured<Options> = Measured {
     id: "half",
     thesis: "§4.6, Figure 4.10",
     about: "Sixteen bits beside float",
-    opens_board: true,
+    boards: Boards::Own,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
@@ -79,6 +80,8 @@ pub(crate) struct Outcome {
     pub(crate) recorded: [RecordedDeviation; 1],
     #[serde(skip)]
     start_text: String,
+    #[serde(skip)]
+    subject: String,
 }
 
 /// A build beside float.
@@ -142,7 +145,7 @@ impl<'a> Side<'a> {
 
 /// Steps all boards and compares them with float.
 pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
-    let common = session.emulated()?;
+    let common = session.emulated();
     let mut start = Start::load(&options.start)?;
     let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
     let mut opened = start.open(&original, &common, session)?;
@@ -215,6 +218,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         splits: splits::of(&start.numbers(&mut of_splits)),
         recorded: [HALF_AGAINST_FLOAT],
         start_text: start.text(),
+        subject: start.subject(),
     })
 }
 

@@ -22,11 +22,12 @@ impl Outcome {
         for recorded in &self.recorded {
             part.fact("recorded", recorded.text());
         }
+        self.add_figure(&mut part);
         part
     }
 
     fn steps(&self) -> Table {
-        let mut table = Table::new(
+        let mut table = Table::with_columns(
             "half",
             "Sixteen bits beside float, step by step",
             &[
@@ -74,28 +75,24 @@ impl Outcome {
     }
 
     fn of_splits(&self) -> Table {
-        let mut table = Table::new(
-            "splits",
-            "Splits of sixteen bits, on the numbers of a step",
-            &[
-                ("format", "format"),
-                ("exponent_bits", "exponent\nbits"),
-                ("mantissa_bits", "mantissa\nbits"),
-                ("smallest", "smallest"),
-                ("below_smallest_percent", "smaller\n%"),
-                ("mean_percent", "error\n% mean"),
-                ("under_1_percent", "error\n% < 1 %"),
-            ],
-        );
+        let mut table = Table::new("splits", "Splits of sixteen bits, on the numbers of a step");
         for split in &self.splits {
             table.row([
-                text(split.format),
-                Cell::Whole(split.exponent_bits.into()),
-                Cell::Whole(split.mantissa_bits.into()),
-                Cell::Digits(split.smallest),
-                Cell::Digits(split.below_smallest_share * 100.0),
-                Cell::Digits(split.relative_mean_percent),
-                Cell::Digits(split.under_1_percent_share * 100.0),
+                ("format", "format", text(split.format)),
+                ("exponent_bits", "exponent\nbits", Cell::Whole(split.exponent_bits.into())),
+                ("mantissa_bits", "mantissa\nbits", Cell::Whole(split.mantissa_bits.into())),
+                ("smallest", "smallest", Cell::Digits(split.smallest)),
+                (
+                    "below_smallest_percent",
+                    "smaller\n%",
+                    Cell::Digits(split.below_smallest_share * 100.0),
+                ),
+                ("mean_percent", "error\n% mean", Cell::Digits(split.relative_mean_percent)),
+                (
+                    "under_1_percent",
+                    "error\n% < 1 %",
+                    Cell::Digits(split.under_1_percent_share * 100.0),
+                ),
             ]);
         }
         table

@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 
+use super::Rung;
 use crate::estimate::thesis::data::{DataRow, TABLES};
 use crate::estimate::thesis::recorded::{Design, ONE_COPY_INTERVAL};
 use crate::estimate::{PORTS, PortAccount, Records, StepCycles, StepShape, StepTime};
@@ -39,31 +40,6 @@ const ONE_COPY_HALF: Profile = Profile {
     memory: OnChipMemory { velocity_copies: 1, ..HALF.memory },
     ..HALF
 };
-
-/// A design's name, its section, and its change on the design before.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Named {
-    pub(super) design: &'static str,
-    pub(super) thesis: &'static str,
-    pub(super) change: &'static str,
-}
-
-/// A design before its factors are known.
-pub(super) struct Modelled {
-    pub(super) named: Named,
-    pub(super) formula: String,
-    /// By streams and by ports.
-    pub(super) intervals: Option<[u32; 2]>,
-    pub(super) collisions_per_issue: u32,
-    pub(super) cycles: [u64; 2],
-    pub(super) clock_khz: u32,
-    /// Time with the bandwidth that a ZCU102 sustains, ms, where memory can limit the design.
-    pub(super) sustained: Option<f64>,
-    pub(super) bound_by: &'static str,
-    pub(super) recorded: Option<&'static Design>,
-    /// Cycles from an issue to the next, as the thesis tells them.
-    pub(super) recorded_interval: Option<u32>,
-}
 
 /// The row of the array that holds the velocities on chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,8 +91,7 @@ fn unreduced_stream(words: Unreduced, step: &StepShape) -> u64 {
 }
 
 /// The designs in the thesis' order.
-pub(super) fn designs(step: &StepShape) -> [Modelled; 8] {
-    let named = |design, thesis, change| Named { design, thesis, change };
+pub(super) fn designs(step: &StepShape) -> [Rung; 8] {
     [
         by_accesses(step),
         by_one_stream(step),
@@ -124,59 +99,53 @@ pub(super) fn designs(step: &StepShape) -> [Modelled; 8] {
             step,
             &NAIVE,
             VelocityRow::Word,
-            named("naive", "§5.4.1", "conversion inside the solvers, reduced records"),
+            ["naive", "§5.4.1", "conversion inside the solvers, reduced records"],
         ),
         by_profile(
             step,
             &ONE_WIDE_STREAM,
             VelocityRow::Word,
-            named(ONE_WIDE_STREAM.name, "§5.4.2", "four words a cycle"),
+            [ONE_WIDE_STREAM.name, "§5.4.2", "four words a cycle"],
         ),
         by_profile(
             step,
             &FOUR_STREAMS,
             VelocityRow::Word,
-            named(FOUR_STREAMS.name, "§5.4.2", "four DMAs"),
+            [FOUR_STREAMS.name, "§5.4.2", "four DMAs"],
         ),
         by_profile(
             step,
             &FLOAT,
             VelocityRow::Whole,
-            named("float", "§5.4.3, §5.4.4", "a velocity is one row: an issue every 2 cycles"),
+            ["float", "§5.4.3, §5.4.4", "a velocity is one row: an issue every 2 cycles"],
         ),
-        Modelled {
+        Rung {
             recorded_interval: Some(ONE_COPY_INTERVAL),
             ..by_profile(
                 step,
                 &ONE_COPY_HALF,
                 VelocityRow::Whole,
-                named(
-                    ONE_COPY_HALF.name,
-                    "§5.5.2",
-                    "sixteen bits, two collisions an issue, 250 MHz",
-                ),
+                [ONE_COPY_HALF.name, "§5.5.2", "sixteen bits, two collisions an issue, 250 MHz"],
             )
         },
         by_profile(
             step,
             &HALF,
             VelocityRow::Whole,
-            named("half", "§5.5.3", "a second copy of the velocities"),
+            ["half", "§5.5.3", "a second copy of the velocities"],
         ),
     ]
 }
 
 /// The design whose every word is a request.
-fn by_accesses(step: &StepShape) -> Modelled {
+fn by_accesses(step: &StepShape) -> Rung {
     let words = Unreduced::of_thesis();
     let Unreduced { collision, velocity, pose, result } = words;
     let [least, most] = ACCESS_CYCLES;
-    Modelled {
-        named: Named {
-            design: "register accesses",
-            thesis: "§5.2",
-            change: "memory-mapped: each word a request",
-        },
+    Rung {
+        design: "register accesses",
+        thesis: "§5.2",
+        change: "memory-mapped: each word a request",
         formula: format!(
             "({} passes x {collision} C + ({velocity} + {pose} + {result}) B) x {least} to {most}",
             step.passes(),
@@ -186,23 +155,23 @@ fn by_accesses(step: &StepShape) -> Modelled {
         cycles: ACCESS_CYCLES.map(|cycles| register_accesses(words.words(step), cycles)),
         clock_khz: NAIVE.clock_khz,
         sustained: None,
+        factor: None,
+        factor_in_all: 1.0,
         bound_by: "accesses",
-        recorded: None,
+        recorded_cycles: None,
         recorded_interval: None,
     }
 }
 
 /// The first design with DMA, whose records are not reduced.
-fn by_one_stream(step: &StepShape) -> Modelled {
+fn by_one_stream(step: &StepShape) -> Rung {
     let words = Unreduced::of_thesis();
     let Unreduced { collision, velocity, pose, result } = words;
     let interval = u32::try_from(collision).unwrap_or(u32::MAX);
-    Modelled {
-        named: Named {
-            design: "one 32-bit stream",
-            thesis: "§5.3.3",
-            change: "DMA: a word a cycle",
-        },
+    Rung {
+        design: "one 32-bit stream",
+        thesis: "§5.3.3",
+        change: "DMA: a word a cycle",
         formula: format!(
             "{} passes x {collision} C + ({velocity} + max({pose}, {result})) B",
             step.passes(),
@@ -219,8 +188,8 @@ fn by_profile(
     step: &StepShape,
     profile: &'static Profile,
     row: VelocityRow,
-    named: Named,
-) -> Modelled {
+    [design, thesis, change]: [&'static str; 3],
+) -> Rung {
     let variant = profile.default_variant();
     let account = PortAccount::new(&variant);
     let streams = account.by_streams;
@@ -234,8 +203,10 @@ fn by_profile(
     let Profile { initiation_interval: interval, collisions_per_issue: each, .. } = *profile;
     let recorded = Design::of(profile).filter(|design| design.profile.name == profile.name);
     let issues = if each == 1 { "C".to_owned() } else { format!("ceil(C / {each})") };
-    Modelled {
-        named,
+    Rung {
+        design,
+        thesis,
+        change,
         formula: format!(
             "{} passes x {interval} x {issues} + fill + load + integration",
             step.passes()
@@ -250,7 +221,9 @@ fn by_profile(
             Ordering::Equal => "both",
             Ordering::Greater => "streams",
         },
-        recorded,
+        factor: None,
+        factor_in_all: 1.0,
+        recorded_cycles: recorded.map(|design| design.cycles),
         recorded_interval: recorded.map(|design| design.initiation_interval),
     }
 }

@@ -9,9 +9,8 @@ mod designs;
 mod show;
 
 use crate::estimate::{StepShape, thesis};
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use clap::Args;
-use serde::Serialize;
 
 use self::designs::designs;
 
@@ -35,7 +34,7 @@ pub(crate) static LADDER: Measured<Options> = Measured {
     id: "ladder",
     thesis: "Chapter 5",
     about: "The designs of chapter 5, from register accesses to sixteen bits",
-    opens_board: false,
+    boards: Boards::None,
     run: |options, _| Ok(measure(options).part()),
 };
 
@@ -58,16 +57,14 @@ impl Default for Options {
 }
 
 /// The ladder.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Outcome {
-    pub(crate) bodies: u64,
-    pub(crate) collisions: u64,
-    pub(crate) passes: u64,
-    pub(crate) rungs: Vec<Rung>,
+    pub(crate) step: StepShape,
+    pub(crate) rungs: [Rung; 8],
 }
 
 /// A design on the ladder.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Rung {
     pub(crate) design: &'static str,
     /// Where the thesis describes it.
@@ -76,21 +73,16 @@ pub(crate) struct Rung {
     pub(crate) change: &'static str,
     /// The formula of the cycles.
     pub(crate) formula: String,
-    /// Cycles an issue that the streams allow; none without streams.
-    pub(crate) interval_by_streams: Option<u32>,
-    /// Cycles an issue that the block RAM allows.
-    pub(crate) interval_by_ports: Option<u32>,
+    /// Cycles an issue that streams and block RAM allow; none without streams.
+    pub(crate) intervals: Option<[u32; 2]>,
     /// Cycles an issue that the thesis prints.
     pub(crate) recorded_interval: Option<u32>,
     pub(crate) collisions_per_issue: u32,
-    /// Cycles of a step; the least, if accesses take a range of cycles.
-    pub(crate) cycles: u64,
-    /// The most.
-    pub(crate) cycles_most: u64,
+    /// Cycles of a step, least and most: accesses take a range of cycles.
+    pub(crate) cycles: [u64; 2],
     pub(crate) clock_khz: u32,
-    pub(crate) milliseconds: f64,
-    /// With the memory bandwidth that a ZCU102 sustains.
-    pub(crate) milliseconds_sustained: f64,
+    /// Time with the memory bandwidth that a ZCU102 sustains, ms, where memory can limit the design.
+    pub(crate) sustained: Option<f64>,
     /// Time of the design before, in units of this one's; none for the first.
     pub(crate) factor: Option<f64>,
     /// Time of the first design, in units of this one's.
@@ -100,36 +92,23 @@ pub(crate) struct Rung {
     pub(crate) recorded_cycles: Option<u64>,
 }
 
+impl Rung {
+    pub(crate) fn milliseconds(&self) -> f64 {
+        self.cycles[0] as f64 / f64::from(self.clock_khz)
+    }
+}
+
 /// Models the ladder.
 pub(crate) fn measure(options: &Options) -> Outcome {
     let step = StepShape::new(options.bodies, options.collisions);
-    let is_thesis_step = step == thesis::step();
-    let mut rungs: Vec<Rung> = Vec::new();
-    for modelled in designs(&step) {
-        let milliseconds = modelled.cycles[0] as f64 / f64::from(modelled.clock_khz);
-        let factor = |of: &Rung| of.milliseconds / milliseconds;
-        rungs.push(Rung {
-            design: modelled.named.design,
-            thesis: modelled.named.thesis,
-            change: modelled.named.change,
-            formula: modelled.formula,
-            interval_by_streams: modelled.intervals.map(|[streams, _]| streams),
-            interval_by_ports: modelled.intervals.map(|[_, ports]| ports),
-            recorded_interval: modelled.recorded_interval,
-            collisions_per_issue: modelled.collisions_per_issue,
-            cycles: modelled.cycles[0],
-            cycles_most: modelled.cycles[1],
-            clock_khz: modelled.clock_khz,
-            milliseconds,
-            milliseconds_sustained: modelled.sustained.unwrap_or(milliseconds),
-            factor: rungs.last().map(factor),
-            factor_in_all: rungs.first().map_or(1.0, factor),
-            bound_by: modelled.bound_by,
-            recorded_cycles: modelled.recorded.filter(|_| is_thesis_step).map(|d| d.cycles),
-        });
+    let mut rungs = designs(&step);
+    let times: Vec<f64> = rungs.iter().map(Rung::milliseconds).collect();
+    for (place, rung) in rungs.iter_mut().enumerate() {
+        rung.factor = (place > 0).then(|| times[place - 1] / times[place]);
+        rung.factor_in_all = times[0] / times[place];
+        rung.recorded_cycles = rung.recorded_cycles.filter(|_| step == thesis::step());
     }
-    let StepShape { bodies, collisions, .. } = step;
-    Outcome { bodies, collisions, passes: step.passes(), rungs }
+    Outcome { step, rungs }
 }
 
 #[cfg(test)]
@@ -139,11 +118,11 @@ mod tests {
     #[test]
     fn each_design_takes_the_cycles_of_a_calculation_by_hand() {
         let outcome = measure(&Options::default());
-        let cycles: Vec<u64> = outcome.rungs.iter().map(|rung| rung.cycles).collect();
+        let cycles: Vec<u64> = outcome.rungs.iter().map(|rung| rung.cycles[0]).collect();
         let (bodies, collisions) = (38_880, 127_000);
         let accesses = (8 * 56 * collisions + (8 + 17 + 8) * bodies) * 30;
         assert_eq!(cycles[0], accesses);
-        assert_eq!(outcome.rungs[0].cycles_most, accesses / 30 * 50);
+        assert_eq!(outcome.rungs[0].cycles[1], accesses / 30 * 50);
         assert_eq!(cycles[1], 8 * 56 * collisions + 25 * bodies);
         // Twelve cycles a collision; fill 4 x 374 + 4 x 314 + 264; 6 + 7 words a body, four a cycle.
         let wide = 8 * 12 * collisions + 2_752 + 264 + (6 + 7) * bodies / 4;
@@ -162,12 +141,9 @@ mod tests {
     #[test]
     fn a_design_issues_no_faster_than_its_streams_and_ports() {
         for rung in measure(&Options::default()).rungs {
-            let Some((streams, ports)) = rung.interval_by_streams.zip(rung.interval_by_ports)
-            else {
-                continue;
-            };
+            let Some([streams, ports]) = rung.intervals else { continue };
             let issues = 8 * 127_000 / u64::from(rung.collisions_per_issue);
-            let interval = rung.cycles / issues;
+            let interval = rung.cycles[0] / issues;
             assert_eq!(interval, u64::from(streams.max(ports)), "{}", rung.design);
         }
     }
@@ -178,7 +154,7 @@ mod tests {
         let printed: Vec<_> = rungs.iter().filter_map(|rung| rung.recorded_interval).collect();
         assert_eq!(printed, [2, 4, 3]);
         for rung in rungs.iter().filter(|rung| rung.recorded_interval.is_some()) {
-            let ours = rung.interval_by_streams.max(rung.interval_by_ports);
+            let ours = rung.intervals.map(|[streams, ports]| streams.max(ports));
             assert_eq!(ours, rung.recorded_interval, "{}", rung.design);
         }
     }

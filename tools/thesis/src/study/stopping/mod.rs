@@ -20,7 +20,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use self::passes::Course;
 pub(crate) use self::passes::Pass;
 use self::residual::Problem;
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
@@ -55,7 +55,7 @@ pub(crate) static STOPPING: Measured<Options> = Measured {
     id: "stopping",
     thesis: "§2.2.3",
     about: "One step with 0, 1, 2 ... passes, and what is left to solve",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 

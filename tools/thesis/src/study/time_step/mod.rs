@@ -8,11 +8,10 @@ mod show;
 
 use clap::Args;
 use scene::{Grid, Scene, SceneOptions};
-use serde::Serialize;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
-use crate::experiment::Measured;
+use crate::experiment::{Boards, Measured};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
@@ -35,8 +34,6 @@ time step: a pile with a short time step is damped and pushed apart more often a
 
 /// Steps a second, from the shortest time step to the longest: each a multiple of the last.
 const RATES: [u16; 6] = [480, 240, 120, 60, 30, 15];
-/// Samples a second of a run.
-const SAMPLES: u16 = 15;
 /// Velocity of the body in flight at the start, m/s.
 const THROWN: [f32; 3] = [3.0, 8.0, 0.0];
 /// Its height, m.
@@ -47,7 +44,7 @@ pub(crate) static TIME_STEP: Measured<Options> = Measured {
     id: "time-step",
     thesis: "§2.1.1, Figure 2.2",
     about: "A body in flight and a pile with time steps from 1/480 s to 1/15 s",
-    opens_board: true,
+    boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
 
@@ -70,7 +67,7 @@ pub(crate) struct Options {
 }
 
 /// The same simulated time in steps of several lengths.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) complete: bool,
     pub(crate) grid: String,
@@ -81,7 +78,7 @@ pub(crate) struct Outcome {
 }
 
 /// One time step.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Row {
     pub(crate) steps_per_second: u16,
     pub(crate) time_step_s: f64,
@@ -90,7 +87,7 @@ pub(crate) struct Row {
 }
 
 /// Distance of a body in free flight from its exact position at the end, m.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Flight {
     pub(crate) explicit_m: f64,
     pub(crate) symplectic_m: f64,
@@ -98,7 +95,7 @@ pub(crate) struct Flight {
 }
 
 /// A pile after the simulated time, and the cost of its steps.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(crate) struct Pile {
     pub(crate) steps: u32,
     pub(crate) deepest_m: f64,
@@ -111,16 +108,13 @@ pub(crate) struct Pile {
     pub(crate) cycles_per_second: f64,
     /// Time on the board for a simulated second.
     pub(crate) board_ms_per_second: f64,
-    pub(crate) samples: Vec<Sample>,
 }
 
 /// The pile at one time.
-#[derive(Debug, Serialize)]
-pub(crate) struct Sample {
-    pub(crate) seconds: f64,
-    pub(crate) deepest_m: f64,
-    pub(crate) kinetic_j: f64,
-    pub(crate) potential_j: f64,
+#[derive(Debug)]
+struct Sample {
+    deepest_m: f64,
+    kinetic_j: f64,
 }
 
 /// Takes the steps of every length.
@@ -217,7 +211,7 @@ impl Run<'_> {
         shortest: Option<&[[f64; 3]]>,
     ) -> Result<Option<Ended>, Failure> {
         let mut scene = scene(options)?;
-        let (mut samples, mut cycles, mut board) = (Vec::new(), 0_u64, 0.0);
+        let (mut cycles, mut board) = (0_u64, 0.0);
         let (mut deepest, mut kinetic_most) = (0.0_f64, 0.0_f64);
         let mut at_end = self.sample(&mut scene, 0);
         for step in 1..=self.steps() {
@@ -230,13 +224,9 @@ impl Run<'_> {
             self.session.advance();
             cycles = cycles.saturating_add(report.cycles.total);
             board += report.modelled_time().as_secs_f64();
-            let now = self.sample(&mut scene, step);
-            deepest = larger(deepest, now.deepest_m);
-            kinetic_most = larger(kinetic_most, now.kinetic_j);
-            let before = std::mem::replace(&mut at_end, now);
-            if (step - 1).is_multiple_of(u32::from(self.rate / SAMPLES)) {
-                samples.push(before);
-            }
+            at_end = self.sample(&mut scene, step);
+            deepest = larger(deepest, at_end.deepest_m);
+            kinetic_most = larger(kinetic_most, at_end.kinetic_j);
         }
         let positions = scene.bodies().iter().map(|body| body.pose.position.map(f64::from));
         let positions: Vec<[f64; 3]> = positions.collect();
@@ -250,7 +240,6 @@ impl Run<'_> {
                 .map_or(0.0, |other| mean_distance(&positions, other)),
             cycles_per_second: cycles as f64 / f64::from(self.seconds),
             board_ms_per_second: board * 1e3 / f64::from(self.seconds),
-            samples: samples.into_iter().chain([at_end]).collect(),
         };
         Ok(Some((pile, positions)))
     }
@@ -264,12 +253,7 @@ impl Run<'_> {
             0 => scene::kinetic_energy_parts(bodies, shapes),
             _ => scene::kinetic_energy_before_gravity(bodies, shapes, gravity, time_step),
         };
-        Sample {
-            seconds: f64::from(step) / f64::from(self.rate),
-            deepest_m,
-            kinetic_j: kinetic.total(),
-            potential_j: scene::potential_energy(bodies, shapes, gravity),
-        }
+        Sample { deepest_m, kinetic_j: kinetic.total() }
     }
 }
 

@@ -12,7 +12,18 @@
 
 use std::collections::BTreeSet;
 
-use super::{OrderInput, Schedule, Ties};
+use zynq_pgs::order::OrderInput;
+
+/// The rule that picks one of several active bodies with the fewest collisions left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ties {
+    /// The body of the lowest index.
+    LowestIndex,
+    /// The body that became active first.
+    Oldest,
+    /// The body that became active last.
+    Newest,
+}
 
 impl Ties {
     fn rank(self, age: u32) -> u32 {
@@ -69,7 +80,7 @@ impl Bodies<'_> {
 }
 
 /// Orders the collisions of an input that was checked.
-pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule) {
+pub(crate) fn order(input: &OrderInput<'_>, ties: Ties) -> Vec<u32> {
     let count = input.moving.len();
     // The collisions of body `b` are `of[starts[b]..starts[b + 1]]`, in ascending order.
     let mut starts = vec![0_usize; count + 1];
@@ -92,7 +103,7 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
     let mut bodies =
         Bodies { input, ties, left, age: vec![None; count], activated: 0, active: BTreeSet::new() };
     let mut done = vec![false; input.pairs.len()];
-    schedule.clear();
+    let mut order = Vec::with_capacity(input.pairs.len());
     let lowest = (0..).zip(input.moving).filter(|(_, moving)| **moving).map(|(body, _)| body);
     for first in lowest {
         let mut current = Some(first).filter(|body: &u32| bodies.left[*body as usize] > 0);
@@ -101,7 +112,7 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
             for index in &of[starts[body as usize]..starts[body as usize + 1]] {
                 if !std::mem::replace(&mut done[*index as usize], true) {
                     let [a, b] = input.pairs[*index as usize];
-                    schedule.entries.push(*index);
+                    order.push(*index);
                     bodies.take_one(body);
                     bodies.take_one(if a == body { b } else { a });
                 }
@@ -110,8 +121,9 @@ pub(super) fn order(input: &OrderInput<'_>, ties: Ties, schedule: &mut Schedule)
         }
     }
     // Pairs of two static bodies belong to no body's turn and come last.
-    let rest = input.taking_part().map(|(index, _)| index).filter(|index| !done[*index as usize]);
-    schedule.entries.extend(rest);
+    order
+        .extend(input.taking_part().map(|(index, _)| index).filter(|index| !done[*index as usize]));
+    order
 }
 
 #[cfg(test)]
@@ -126,11 +138,7 @@ mod tests {
             moving: &[false, true, true, true, true, true, true, true, true, true],
             positions: &[[0.0; 3]; 10],
         };
-        let ordered = |ties| {
-            let mut schedule = Schedule::default();
-            order(&input, ties, &mut schedule);
-            schedule.entries
-        };
+        let ordered = |ties| order(&input, ties);
         // Active in the order 1, 4, 3, 2.
         assert_eq!(ordered(Ties::LowestIndex), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(ordered(Ties::Oldest), [0, 1, 2, 4, 3, 5, 6, 7]);

@@ -1,66 +1,74 @@
-//! Orders of the collisions that the command itself makes, before the driver gets the collisions.
+//! Orders that an experiment makes of a step's collisions, before the board gets these as given.
 //!
 //! A board that waits on hazards solves the collisions one after the other in the order in which it
 //! gets them. So a permuted list, sent as given, is a solution in that order.
 
+pub(crate) mod body_by_body;
 mod cells;
+pub(crate) mod colours;
 
 use std::path::Path;
 
+use pgs_command::failure::Failure;
 use scene::SplitMix64;
-use zynq_pgs::order::InputBuffers;
+use step_folder::npy::{self, Dimensions};
+use zynq_pgs::order::{InputBuffers, OrderInput};
 use zynq_pgs::{Body, Collision, Shape};
 
-use crate::failure::Failure;
-use step_folder::npy::{self, Dimensions};
+use self::body_by_body::Ties;
 
 /// The order of the collisions on Bullet's GPU, if a folder has it.
 const GPU_ORDER: &str = "gpu_order.npy";
-/// The name of Bullet's GPU order.
-const GPU: &str = "gpu";
 /// The beginning of a random order; its seed follows.
 const RANDOM: &str = "random=";
 
-/// An order that the command makes.
+/// An order that an experiment makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Permutation {
+pub(crate) enum Permutation {
     /// A random order, another one in each step, from this seed.
     Random(u64),
     /// The order of Bullet's GPU.
     Gpu,
+    /// Greedy colouring: no hazards if colours are large, nearly all bodies alive.
+    Colours,
+    /// The thesis' Algorithm 3: few bodies alive, nearly all collisions hazardous.
+    BodyByBody(Ties),
 }
+
+/// The orders without a seed, as they are written.
+const WORDS: [(&str, Permutation); 5] = [
+    ("gpu", Permutation::Gpu),
+    ("colours", Permutation::Colours),
+    ("body-by-body", Permutation::BodyByBody(Ties::LowestIndex)),
+    ("body-by-body-oldest", Permutation::BodyByBody(Ties::Oldest)),
+    ("body-by-body-newest", Permutation::BodyByBody(Ties::Newest)),
+];
 
 impl Permutation {
     /// The forms in which it is written.
-    pub const FORMS: [(&'static str, &'static str); 2] = [
-        (
-            GPU,
-            "As Bullet's GPU solves them: from the folder's gpu_order.npy, otherwise by the same \
-             cells of 6 m and batches of 64",
-        ),
-        ("random=SEED", "At random, another order in each step; the same for a seed everywhere"),
-    ];
+    pub(crate) fn forms() -> impl Iterator<Item = &'static str> {
+        WORDS.iter().map(|(word, _)| *word).chain(["random=SEED"])
+    }
 
     /// Reads it; none if the text has another form.
-    pub fn of_word(word: &str) -> Option<Self> {
-        if word == GPU {
-            return Some(Self::Gpu);
-        }
-        word.strip_prefix(RANDOM)?.parse().ok().map(Self::Random)
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        let seed = || word.strip_prefix(RANDOM)?.parse().ok().map(Self::Random);
+        let known = WORDS.iter().find(|(known, _)| *known == word);
+        known.map(|(_, order)| *order).or_else(seed)
     }
 
     /// As it is written.
-    pub fn text(self) -> String {
-        match self {
-            Self::Random(seed) => format!("{RANDOM}{seed}"),
-            Self::Gpu => GPU.to_owned(),
+    pub(crate) fn text(self) -> String {
+        match (self, WORDS.iter().find(|(_, order)| *order == self)) {
+            (Self::Random(seed), _) => format!("{RANDOM}{seed}"),
+            (_, word) => word.map(|(word, _)| (*word).to_owned()).unwrap_or_default(),
         }
     }
 }
 
 /// Puts the collisions of one step after the other in an order.
 #[derive(Debug)]
-pub struct Arranger {
+pub(crate) struct Arranger {
     source: Source,
     buffers: InputBuffers,
     arranged: Vec<Collision>,
@@ -71,27 +79,42 @@ enum Source {
     Random(SplitMix64),
     /// The order of the only step.
     Given(Vec<u32>),
-    Cells,
+    Made(Making),
 }
+
+/// Makes an order of an input that was checked.
+pub(crate) type Making = fn(&OrderInput<'_>) -> Vec<u32>;
 
 impl Arranger {
     /// Prepares an order. `recorded` is the order of Bullet's GPU, where it is known.
-    pub fn new(permutation: Permutation, recorded: Option<Vec<u32>>) -> Self {
+    pub(crate) fn new(permutation: Permutation, recorded: Option<Vec<u32>>) -> Self {
         let source = match (permutation, recorded) {
             (Permutation::Random(seed), _) => Source::Random(SplitMix64::new(seed)),
             (Permutation::Gpu, Some(order)) => Source::Given(order),
-            (Permutation::Gpu, None) => Source::Cells,
+            (Permutation::Gpu, None) => Source::Made(cells::order),
+            (Permutation::Colours, _) => Source::Made(|input| colours::order(input).0),
+            (Permutation::BodyByBody(ties), _) => Source::Made(match ties {
+                Ties::LowestIndex => |input| body_by_body::order(input, Ties::LowestIndex),
+                Ties::Oldest => |input| body_by_body::order(input, Ties::Oldest),
+                Ties::Newest => |input| body_by_body::order(input, Ties::Newest),
+            }),
         };
         Self { source, buffers: InputBuffers::new(), arranged: Vec::new() }
     }
 
-    /// The collisions of the next step in their order.
-    pub fn arrange(
-        &mut self,
+    /// The collisions of the next step in their order. Where one of them has a body that does not exist
+    /// they stay as given, so that the board's refusal names the place of this one.
+    pub(crate) fn arrange<'a>(
+        &'a mut self,
         bodies: &[Body],
         shapes: &[Shape],
-        collisions: &[Collision],
-    ) -> &[Collision] {
+        collisions: &'a [Collision],
+    ) -> &'a [Collision] {
+        let input = self.buffers.gather(bodies, collisions, shapes);
+        let exists = |body: u32| usize::try_from(body).is_ok_and(|body| body < bodies.len());
+        if input.taking_part().any(|(_, pair)| !pair.into_iter().all(exists)) {
+            return collisions;
+        }
         let made;
         let order = match &mut self.source {
             Source::Random(random) => {
@@ -99,8 +122,8 @@ impl Arranger {
                 &made
             }
             Source::Given(order) => order,
-            Source::Cells => {
-                made = cells::order(&self.buffers.gather(bodies, collisions, shapes));
+            Source::Made(making) => {
+                made = making(&input);
                 &made
             }
         };
@@ -113,7 +136,7 @@ impl Arranger {
 }
 
 /// Fisher and Yates' shuffle of the numbers below `count`.
-pub fn shuffled(random: &mut SplitMix64, count: usize) -> Vec<u32> {
+pub(crate) fn shuffled(random: &mut SplitMix64, count: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..).take(count).collect();
     for k in (1..count).rev() {
         order.swap(k, random.below(k + 1));
@@ -126,7 +149,7 @@ pub fn shuffled(random: &mut SplitMix64, count: usize) -> Vec<u32> {
 /// # Errors
 ///
 /// Fails where the file is no permutation of that many indices.
-pub fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
+pub(crate) fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
     let path = &folder.join(GPU_ORDER);
     // Opening the file reports a name that cannot be looked up.
     if matches!(path.try_exists(), Ok(false)) {
@@ -149,9 +172,14 @@ pub fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{CONTACT_POINTS, Contact};
+    use zynq_pgs::{CONTACT_POINTS, Contact, Pose, Velocity};
 
     use super::*;
+
+    fn body() -> Body {
+        let pose = Pose { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
+        Body { pose, velocity: Velocity::default(), shape: 0 }
+    }
 
     #[test]
     fn a_shuffle_is_a_permutation_and_far_from_the_order_given() {
@@ -165,8 +193,8 @@ mod tests {
 
     #[test]
     fn a_permutation_is_written_as_it_is_read() {
-        for permutation in [Permutation::Gpu, Permutation::Random(0), Permutation::Random(u64::MAX)]
-        {
+        let random = [0, u64::MAX].map(Permutation::Random);
+        for permutation in WORDS.iter().map(|(_, order)| *order).chain(random) {
             assert_eq!(Permutation::of_word(&permutation.text()), Some(permutation));
         }
         for wrong in ["random", "random=", "random=-1", "random=x", "GPU", "gpu=1"] {
@@ -178,16 +206,17 @@ mod tests {
     fn each_step_of_a_random_order_has_another_one_and_a_seed_always_the_same() {
         let collisions: Vec<Collision> = (0..50)
             .map(|body_b| Collision {
-                body_a: 0,
+                body_a: 50,
                 body_b,
                 normal: [0.0, 1.0, 0.0],
-                count: 0,
+                count: 1,
                 contacts: [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS],
             })
             .collect();
+        let bodies = vec![body(); 51];
         let two_steps = |seed| {
             let mut arranger = Arranger::new(Permutation::Random(seed), None);
-            let mut step = || arranger.arrange(&[], &[], &collisions).to_vec();
+            let mut step = || arranger.arrange(&bodies, &[], &collisions).to_vec();
             [step(), step()]
         };
         let [first, second] = two_steps(7);
@@ -197,6 +226,30 @@ mod tests {
         let mut sorted = first;
         sorted.sort_by_key(|collision| collision.body_b);
         assert_eq!(sorted, collisions);
+    }
+
+    /// Orders of one step: each collision once, and the bodies' own order where a body does not exist.
+    #[test]
+    fn every_order_has_each_collision_once() {
+        let contacts = [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS];
+        let normal = [0.0, 1.0, 0.0];
+        let of =
+            |[body_a, body_b]: [u32; 2]| Collision { body_a, body_b, normal, count: 1, contacts };
+        let pairs = [[0, 4], [4, 1], [1, 2], [2, 3], [3, 0], [2, 0], [4, 3]];
+        let (bodies, shapes) = (vec![body(); 5], [Shape::isotropic(1.0, 1.0)]);
+        for permutation in WORDS.iter().map(|(_, order)| *order).chain([Permutation::Random(3)]) {
+            let mut arranger = Arranger::new(permutation, None);
+            let mut collisions = pairs.map(of);
+            let pair = |collision: &Collision| [collision.body_a, collision.body_b];
+            let mut found: Vec<_> =
+                arranger.arrange(&bodies, &shapes, &collisions).iter().map(pair).collect();
+            found.sort_unstable();
+            let mut expected = pairs;
+            expected.sort_unstable();
+            assert_eq!(found, expected, "{permutation:?}");
+            collisions[3].body_b = 5;
+            assert_eq!(arranger.arrange(&bodies, &shapes, &collisions), collisions);
+        }
     }
 
     #[test]

@@ -96,8 +96,8 @@ mod tests {
 
     use super::super::recorded;
     use super::*;
-    use crate::environment::variable;
-    use crate::step_input;
+    use pgs_command::environment::variable;
+    use pgs_command::step_input;
 
     #[test]
     fn the_cells_of_the_full_step_are_those_of_the_gpu() {

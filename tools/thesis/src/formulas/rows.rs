@@ -58,8 +58,8 @@ const fn data(table: &'static str, thesis: &'static str) -> Source {
     Source { table, section: "data", thesis: Place::Fixed(thesis), names: &[], figures: &FIGURES }
 }
 
-/// Data and memory.
-const CHAPTER_4: [Source; 8] = [
+/// The tables that have figures of the thesis.
+const SOURCES: [Source; 13] = [
     data("T4.1", "§4.4.1, Table 4.1"),
     data("T4.2", "§4.4.1, Table 4.2"),
     data("T4.3", "§4.4.1, Table 4.3"),
@@ -80,10 +80,6 @@ const CHAPTER_4: [Source; 8] = [
         names: &["profile"],
         figures: &[figure("thesis_with_positions_mib", &["with_positions_mib"], " MiB")],
     },
-];
-
-/// Cycles, resources and the comparison with GPU and CPU.
-const CHAPTER_6: [Source; 5] = [
     Source {
         table: "cycles",
         section: "step",
@@ -122,9 +118,6 @@ const CHAPTER_6: [Source; 5] = [
     },
 ];
 
-/// The first sources of chapter 6: results of the designs alone (Tables 6.4 and 6.8).
-const RESULTS: usize = 2;
-
 /// A place of a design's figures, from the short name of a table.
 fn of_design(design: &Design, table: &str, what: &str) -> String {
     let table = match table.strip_prefix('T') {
@@ -134,17 +127,22 @@ fn of_design(design: &Design, table: &str, what: &str) -> String {
     format!("{}, {table}{what}", design.section)
 }
 
-pub(super) fn of_chapter_4(tables: &[Table]) -> Result<Vec<Row>, Failure> {
-    rows(&CHAPTER_4, tables)
-}
-
-pub(super) fn of_chapter_6(tables: &[Table]) -> Result<Vec<Row>, Failure> {
-    let (results, comparisons) = CHAPTER_6.split_at(RESULTS);
-    let mut all = vec![device(), powers()];
-    all.extend(rows(results, tables)?);
-    all.extend(DESIGNS.map(logic));
-    all.extend(rows(comparisons, tables)?);
-    Ok(all)
+/// The rows of the index that lead to the tables of an experiment.
+pub(super) fn of(section: &str, tables: &[Table]) -> Result<Vec<Row>, Failure> {
+    let mut rows = match section {
+        "memory" => std::iter::once(device()).chain(DESIGNS.map(logic)).collect(),
+        "comparison" => vec![powers()],
+        _ => Vec::new(),
+    };
+    for source in SOURCES.iter().filter(|source| source.section == section) {
+        let table = tables.iter().find(|table| table.id == source.table);
+        let table = table.ok_or_else(|| source.missing("table"))?;
+        match source.names {
+            [] => rows.push(source.together(table)?),
+            names => rows.extend(source.each(table, names)?),
+        }
+    }
+    Ok(rows)
 }
 
 /// The block RAM of the device (Table 6.1).
@@ -156,7 +154,7 @@ fn device() -> Row {
         recorded: format!("{DEVICE_MEGABYTES} MB"),
         ours: format!("{} BRAM_18K: {mebibytes:.1} MiB", grouped(BLOCKS)),
         origin: Origin::Modelled,
-        command: "pgs thesis memory".to_owned(),
+        command: String::new(),
         shown: anchor("blocks"),
     }
 }
@@ -173,7 +171,7 @@ fn powers() -> Row {
             both(|platform| platform.watts)
         ),
         origin: Origin::Open,
-        command: "pgs thesis comparison".to_owned(),
+        command: String::new(),
         shown: anchor("platforms"),
     }
 }
@@ -188,7 +186,7 @@ fn logic(design: &Design) -> Row {
             "Yosys counts the cells of its generated Verilog (the command)",
             "tools/scripts/rtl-resources.sh",
         ),
-        false => ("it has no Verilog", "pgs thesis memory"),
+        false => ("it has no Verilog", ""),
     };
     Row {
         thesis: of_design(design, design.results, ": logic and clock"),
@@ -199,20 +197,6 @@ fn logic(design: &Design) -> Row {
         command: command.to_owned(),
         shown: anchor("logic"),
     }
-}
-
-/// A row of the index for each row of a table that has a figure of the thesis.
-fn rows(sources: &[Source], tables: &[Table]) -> Result<Vec<Row>, Failure> {
-    let mut rows = Vec::new();
-    for source in sources {
-        let table = tables.iter().find(|table| table.id == source.table);
-        let table = table.ok_or_else(|| source.missing("table"))?;
-        match source.names {
-            [] => rows.push(source.together(table)?),
-            names => rows.extend(source.each(table, names)?),
-        }
-    }
-    Ok(rows)
 }
 
 impl Source {
@@ -303,7 +287,7 @@ impl Source {
             recorded,
             ours,
             origin: Origin::Modelled,
-            command: format!("pgs thesis {}", self.section),
+            command: String::new(),
             shown: table.anchor(),
         }
     }
@@ -312,13 +296,10 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formulas::thesis_tables;
+    use crate::formulas::thesis_parts;
 
     fn all() -> Vec<Row> {
-        let tables = thesis_tables();
-        let mut rows = of_chapter_4(&tables).expect("every source has its table");
-        rows.extend(of_chapter_6(&tables).expect("every source has its table"));
-        rows
+        thesis_parts().into_iter().flat_map(|part| part.rows).collect()
     }
 
     fn of<'a>(rows: &'a [Row], thesis: &str, subject: &str) -> &'a Row {

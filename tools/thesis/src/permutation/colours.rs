@@ -4,12 +4,11 @@
 //! Each collision takes the lowest colour that neither body has. A round searches 64 colours; a
 //! collision without a free colour waits for a further round.
 
-use super::{OrderInput, Schedule};
+use zynq_pgs::order::OrderInput;
 
-/// Orders the collisions of an input that was checked by colour; returns the number of colours.
-pub(super) fn order(input: &OrderInput<'_>, schedule: &mut Schedule) -> usize {
-    schedule.clear();
-    let mut colours = 0;
+/// Orders the collisions of an input that was checked by colour; also the number of colours.
+pub(crate) fn order(input: &OrderInput<'_>) -> (Vec<u32>, usize) {
+    let (mut order, mut colours) = (Vec::with_capacity(input.pairs.len()), 0);
     let mut todo: Vec<u32> = input.taking_part().map(|(index, _)| index).collect();
     let mut later = Vec::new();
     while !todo.is_empty() {
@@ -29,13 +28,13 @@ pub(super) fn order(input: &OrderInput<'_>, schedule: &mut Schedule) -> usize {
             by_colour[colour as usize].push(*index);
         }
         for colour in by_colour.iter().filter(|colour| !colour.is_empty()) {
-            schedule.entries.extend(colour);
+            order.extend(colour);
             colours += 1;
         }
         todo.clear();
         std::mem::swap(&mut todo, &mut later);
     }
-    colours
+    (order, colours)
 }
 
 #[cfg(test)]
@@ -47,10 +46,9 @@ mod tests {
         let pairs: Vec<[u32; 2]> = (1..=150).map(|body| [0, body]).collect();
         let moving = [true; 151];
         let input = OrderInput { pairs: &pairs, moving: &moving, positions: &[[0.0; 3]; 151] };
-        let mut schedule = Schedule::default();
-        assert_eq!(order(&input, &mut schedule), 150);
-        assert_eq!(schedule.collisions(), 150);
+        let (found, colours) = order(&input);
+        assert_eq!((found.len(), colours), (150, 150));
         let still = OrderInput { moving: &[[false].as_slice(), &moving[1..]].concat(), ..input };
-        assert_eq!(order(&still, &mut schedule), 1);
+        assert_eq!(order(&still).1, 1);
     }
 }

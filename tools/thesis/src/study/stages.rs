@@ -1,20 +1,33 @@
 //! Figures 5.1 and 5.2: a step without a pipeline and with one, on the channels of the board.
 
+use clap::Args;
 use pgs_interface::profile::{FLOAT, NAIVE, Profile};
 use scene::{Grid, Scene, SceneOptions};
 use step_trace::TracedStep;
 use zynq_pgs::StepParameters;
 use zynq_pgs::emulation::Build;
 
-use crate::experiment::Part;
+use crate::experiment::{Boards, Measured, Part};
 use crate::figure::Figure;
-use crate::index::{Origin, Row};
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Cause, Failure};
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::described;
 use pgs_command::options::scenes::DROP;
+
+/// The experiment.
+pub(crate) static STAGES: Measured<Options> = Measured {
+    id: "stages",
+    thesis: "§5.1.1, Figures 5.1 and 5.2",
+    about: "The stages of a step without a pipeline, and with one",
+    boards: Boards::Own,
+    run: |_, session| measure(&session.emulated()),
+};
+
+/// It has no arguments.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Options {}
 
 /// Steps before the recorded one: the cubes have landed.
 const STEPS: u32 = 40;
@@ -54,53 +67,38 @@ fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u
     Ok((String::from_utf8_lossy(&svg).into_owned(), cycles))
 }
 
-pub(crate) fn part(common: &CommonArgs) -> Result<Part, Failure> {
-    let (one_by_one, naive) = timeline(&NAIVE, common)?;
-    let (pipelined, float) = timeline(&FLOAT, common)?;
-    let figure = |id, thesis, title: &str, svg, caption: &str| Figure {
-        id,
-        thesis,
-        title: title.to_owned(),
-        svg,
-        caption: caption.to_owned(),
-        origin: Origin::Modelled,
-        playback: None,
-    };
-    let figures = vec![
-        figure(
-            "figure-5-1",
-            "§5.1.1, Figure 5.1",
+fn measure(common: &CommonArgs) -> Result<Part, Failure> {
+    let mut part = Part::of(Vec::new());
+    for (profile, id, title, caption) in [
+        (
+            &NAIVE,
+            ("figure-5-1", "§5.1.1, Figure 5.1"),
             "Stages of a step without a pipeline (profile naive)",
-            one_by_one,
             "One stream of 32 bits: a collision is solved when all of its words have come.",
         ),
-        figure(
-            "figure-5-2",
-            "§5.1.1, Figure 5.2",
+        (
+            &FLOAT,
+            ("figure-5-2", "§5.1.1, Figure 5.2"),
             "The same step with a pipeline, on four channels (profile float)",
-            pipelined,
             "Four streams of 128 bits: a collision enters every two cycles unless it must wait for a body.",
         ),
-    ];
-    let command = |profile: &Profile| {
+    ] {
+        let (svg, cycles) = timeline(profile, common)?;
+        let figure = Figure::new(id, title, svg, caption).modelled();
+        let mut row = figure.row(
+            format!("a step of {} cubes, profile {}", SIDE * SIDE * SIDE, profile.name),
+            "a drawing, no numbers",
+            format!("{} cycles on the emulated board", grouped(cycles)),
+        );
         let StepParameters { contact_iterations, friction_iterations, .. } =
             StepParameters::default();
-        format!(
+        row.command = format!(
             "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations {contact_iterations} \
              --friction-iterations {friction_iterations} --profile {} --json --timeline step.svg",
             STEPS + 1,
             profile.name
-        )
-    };
-    let row = |figure: &Figure, profile: &Profile, cycles: u64| Row {
-        thesis: figure.thesis.to_owned(),
-        subject: format!("a step of {} cubes, profile {}", SIDE * SIDE * SIDE, profile.name),
-        recorded: "a drawing, no numbers".to_owned(),
-        ours: format!("{} cycles on the emulated board", grouped(cycles)),
-        origin: Origin::Modelled,
-        command: command(profile),
-        shown: figure.id.to_owned(),
-    };
-    let rows = vec![row(&figures[0], &NAIVE, naive), row(&figures[1], &FLOAT, float)];
-    Ok(Part { figures, rows, ..Part::default() })
+        );
+        part.figure(figure, [row]);
+    }
+    Ok(part)
 }
