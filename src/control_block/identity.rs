@@ -434,12 +434,12 @@ mod tests {
         let with = |registers: &[(u32, u32)], more: &[(u32, u32)]| {
             identify_with(&[registers, more].concat())
         };
-        // thesis16 on both streams, arithmetic and arrays of mixed kinds.
-        let found = with(&HALF_REGISTERS, &[(0x144, 0x0210_0122)]).expect("known formats");
+        // Arithmetic and arrays of mixed kinds.
+        let found = with(&HALF_REGISTERS, &[(0x144, 0x0110_0111)]).expect("known formats");
         let expected = Numbers {
-            collisions: StreamFormat::Thesis16,
-            bodies: StreamFormat::Thesis16,
-            poses: StreamFormat::Thesis16,
+            collisions: StreamFormat::Binary16,
+            bodies: StreamFormat::Binary16,
+            poses: StreamFormat::Binary16,
             rows: Precision::Binary16,
             updates: Precision::F32,
             velocities: Precision::F32,
@@ -451,10 +451,6 @@ mod tests {
         let error = with(&HALF_REGISTERS, &[(0x10C, 0x3)]);
         let error = error.expect_err("half has no such build").to_string();
         assert!(error.starts_with("FEATURES is 0x00000003, expected isotropic"), "{error}");
-        let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");
-        let numbers = literal.variant.numbers;
-        let of_streams = [numbers.collisions, numbers.bodies, numbers.poses];
-        assert_eq!(of_streams, [StreamFormat::Thesis16Literal; 3]);
     }
 
     #[test]

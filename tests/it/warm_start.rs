@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::common::direct::{direct_step, direct_step_from};
 use crate::common::random_scene::{round_shapes, scene, shapes};
 use crate::common::{bits, open_with, ordered};
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::number::{Numbers, Precision};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE};
 use bitstream_model::{BoardConfig, EmulatedBoard, FaultPlan, Hazards};
 use half::f16;
 use zynq_pgs::order::{InputBuffers, IssueWindow, Order, Orderer};
 use zynq_pgs::{
-    Accelerator, Body, Collision, Collisions, Error, Excess, Fault, Impulses, InputError,
-    StepParameters, WarmCollisions,
+    Accelerator, Body, Collision, Collisions, Error, Fault, Impulses, InputError, StepParameters,
+    WarmCollisions,
 };
 
 fn words(impulses: &[Impulses]) -> &[u32] {
@@ -336,28 +336,6 @@ fn impulses_that_are_no_numbers_or_of_another_number_are_refused() {
         impulses[17] = wrong;
         let found = refused(config, &impulses, &parameters);
         assert_eq!(found, InputError::ImpulseNotFinite { collision: 17 });
-    }
-}
-
-#[test]
-fn words_without_a_zero_refuse_a_warm_start_and_name_the_profiles_that_can() {
-    let count = scene(5).1.len();
-    let impulses = vec![Impulses::ZERO; count];
-    let usual = BoardConfig::default();
-    let thesis = Numbers { collisions: StreamFormat::Thesis16, ..Numbers::BINARY16 };
-    let config = BoardConfig { profile: &HALF, numbers: Some(thesis), ..usual };
-    for (parameters, asked) in [
-        (ordered(Order::AsGiven).with_warm_start(true), "a warm start"),
-        (ordered(Order::AsGiven).with_impulses_out(true), "the impulses of the collisions"),
-    ] {
-        let found = refused(config, &impulses, &parameters);
-        let excess = found.excess();
-        assert!(
-            matches!(excess, Some(Excess::NotInRecords { asked: found }) if *found == *asked),
-            "{found}"
-        );
-        let text = found.to_string();
-        assert!(text.contains("naive, float, half)"), "{text}");
     }
 }
 

@@ -126,7 +126,6 @@ mod tests {
     use crate::beat::format::in_format;
     use crate::beat::stripe::BLOCK;
     use crate::beat::stripe::{Layout, Segment};
-    use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
 
     /// The places of the first `BEATS` beats of a pattern.
@@ -187,7 +186,7 @@ mod tests {
             let mut beats = vec![Beat::default(); 4 * BLOCK * ROWS];
             let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(BLOCK * ROWS).collect();
             let sum = &mut Lanes::all(0);
-            in_format!(Sixteen::of(layout.format), F => {
+            in_format!(layout.format, F => {
                 write::<_, F, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
             })
         }

@@ -1,7 +1,6 @@
 //! Chooses how a board is built.
 
-use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{HALF, PROFILES, Variant};
+use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
 
 use crate::input::Input;
@@ -44,18 +43,11 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
 }
 
 fn variant(input: &mut Input<'_>) -> Variant {
-    let thesis = |format| {
-        let numbers =
-            Numbers { collisions: format, bodies: format, poses: format, ..Numbers::BINARY16 };
-        Variant { numbers, ..HALF.default_variant() }
-    };
     let built = PROFILES.iter().flat_map(|profile| {
         let inertias = profile.inertias().iter();
         inertias.map(|inertia| Variant { inertia: *inertia, ..profile.default_variant() })
     });
-    let all: Vec<Variant> =
-        built.chain([StreamFormat::Thesis16, StreamFormat::Thesis16Literal].map(thesis)).collect();
-    input.pick(&all)
+    input.pick(&built.collect::<Vec<Variant>>())
 }
 
 #[cfg(test)]

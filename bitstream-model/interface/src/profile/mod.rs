@@ -159,20 +159,6 @@ impl Variant {
         matches!(self.numbers.collisions, StreamFormat::F32)
     }
 
-    /// Whether bodies of inverse mass 0 can move: one at rest needs a zero.
-    #[must_use]
-    pub const fn has_kinematic(&self) -> bool {
-        self.numbers.bodies.has_zero_and_infinity()
-    }
-
-    /// Whether impulses can come in and go out: a collision without any needs a zero, and their row
-    /// a stream.
-    #[must_use]
-    pub const fn has_impulses(&self) -> bool {
-        self.profile.stripes.warm_collisions.is_some()
-            && self.numbers.collisions.has_zero_and_infinity()
-    }
-
     /// Whether velocity records can bring the inverse mass of their body: the rows of a world inertia
     /// have room for it.
     #[must_use]
