@@ -90,11 +90,11 @@ pub struct AcceleratorOptions {
 /// breaks no command that does not use it.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
-    /// Of a verb that opens a board of any kind.
+    /// A verb opens a board of any kind.
     pub board: Option<BoardOptions>,
-    /// Of a verb that asks the FPGA manager, and opens no board.
+    /// A verb asks the FPGA manager and opens no board.
     pub manager: Option<ManagerOptions>,
-    /// Of a verb that may build an emulated board.
+    /// A verb may build an emulated board.
     pub accelerator: Option<AcceleratorOptions>,
 }
 

@@ -40,7 +40,7 @@ pub(crate) struct AllArgs {
 }
 
 impl AllArgs {
-    /// Whether all experiments are asked for.
+    /// Whether the request is for all experiments.
     pub(crate) const fn is_asked(&self) -> bool {
         self.all
     }
