@@ -89,6 +89,8 @@ impl Outcome {
     }
 }
 
+use Source::{Latency, Powers};
+
 /// A figure of the thesis' comparison.
 struct Figure {
     /// The thesis' table.
@@ -105,85 +107,89 @@ enum Source {
     Powers(f64),
 }
 
+const fn figure(
+    table: fn(&Design) -> &'static str,
+    name: &'static str,
+    printed: fn(&Design) -> Option<f64>,
+    of: Source,
+) -> Figure {
+    Figure { table, name, printed, of }
+}
+
+/// A figure of its latency table, of its speed-ups, and of its efficiencies.
+const COMPARISON: fn(&Design) -> &'static str = |design| design.comparison;
+const SPEEDUPS: fn(&Design) -> &'static str = |design| design.speedups;
+const EFFICIENCIES: fn(&Design) -> &'static str = |design| design.efficiencies;
+
 const FIGURES: [Figure; 13] = [
-    Figure {
-        table: |design| design.comparison,
-        name: "latency, ms",
-        printed: |design| Some(design.latency_ms),
-        of: Source::Latency(|outcome| outcome.ms),
-    },
-    Figure {
-        table: |design| design.comparison,
-        name: "energy at 15 W, J",
-        printed: |design| Some(design.joules),
-        of: Source::Latency(Outcome::joules),
-    },
-    Figure {
-        table: |design| design.speedups,
-        name: "speed-up over GTX 980",
-        printed: |design| Some(design.speedup.gpu),
-        of: Source::Latency(|outcome| outcome.speedup(&GPU)),
-    },
-    Figure {
-        table: |design| design.speedups,
-        name: "speed-up over i7-3770",
-        printed: |design| Some(design.speedup.cpu),
-        of: Source::Latency(|outcome| outcome.speedup(&CPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency over GTX 980",
-        printed: |design| Some(design.power.gpu),
-        of: Source::Powers(GPU.watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency over i7-3770",
-        printed: |design| Some(design.power.cpu),
-        of: Source::Powers(CPU.watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency over GTX 980",
-        printed: |design| Some(design.energy.gpu),
-        of: Source::Latency(|outcome| outcome.energy(&GPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency over i7-3770",
-        printed: |design| Some(design.energy.cpu),
-        of: Source::Latency(|outcome| outcome.energy(&CPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency, GTX 980 TDP",
-        printed: |_| None,
-        of: Source::Powers(GPU.design_watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency, i7-3770 TDP",
-        printed: |_| None,
-        of: Source::Powers(CPU.design_watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency, GTX 980 TDP",
-        printed: |_| None,
-        of: Source::Latency(|outcome| outcome.energy_at(GPU.design_watts, &GPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency, i7-3770 TDP",
-        printed: |_| None,
-        of: Source::Latency(|outcome| outcome.energy_at(CPU.design_watts, &CPU)),
-    },
-    Figure {
-        table: |_| "eq 6.5",
-        name: "whole step over GTX 980's",
-        printed: |design| Some(design.whole_step),
-        of: Source::Latency(Outcome::whole_step),
-    },
+    figure(COMPARISON, "latency, ms", |it| Some(it.latency_ms), Latency(|it| it.ms)),
+    figure(COMPARISON, "energy at 15 W, J", |it| Some(it.joules), Latency(Outcome::joules)),
+    figure(
+        SPEEDUPS,
+        "speed-up over GTX 980",
+        |it| Some(it.speedup.gpu),
+        Latency(|it| it.speedup(&GPU)),
+    ),
+    figure(
+        SPEEDUPS,
+        "speed-up over i7-3770",
+        |it| Some(it.speedup.cpu),
+        Latency(|it| it.speedup(&CPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency over GTX 980",
+        |it| Some(it.power.gpu),
+        Powers(GPU.watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency over i7-3770",
+        |it| Some(it.power.cpu),
+        Powers(CPU.watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency over GTX 980",
+        |it| Some(it.energy.gpu),
+        Latency(|it| it.energy(&GPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency over i7-3770",
+        |it| Some(it.energy.cpu),
+        Latency(|it| it.energy(&CPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency, GTX 980 TDP",
+        |_| None,
+        Powers(GPU.design_watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency, i7-3770 TDP",
+        |_| None,
+        Powers(CPU.design_watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency, GTX 980 TDP",
+        |_| None,
+        Latency(|it| it.energy_at(GPU.design_watts, &GPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency, i7-3770 TDP",
+        |_| None,
+        Latency(|it| it.energy_at(CPU.design_watts, &CPU)),
+    ),
+    figure(
+        |_| "eq 6.5",
+        "whole step over GTX 980's",
+        |it| Some(it.whole_step),
+        Latency(Outcome::whole_step),
+    ),
 ];
 
 fn against(scene: &Scene) -> Table {
@@ -268,8 +274,8 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
         text(variant.profile.name),
         text(design.map_or("-", figure.table)),
         text(figure.name),
-        printed.map_or(Cell::Missing, number),
-        recomputed.map_or(Cell::Missing, number),
+        Cell::known(printed, number),
+        Cell::known(recomputed, number),
         packed,
         off,
         unlimited,

@@ -28,15 +28,11 @@ fn cycles(scene: &Scene) -> Table {
                 ("integration", "integration", Cell::Whole(cycles.integration())),
                 ("integration_fill", "its fill", Cell::Whole(cycles.integration_fill)),
                 ("total", "total", Cell::Whole(cycles.total)),
-                (
-                    "thesis",
-                    "thesis",
-                    design.map_or(Cell::Missing, |design| Cell::Whole(design.cycles)),
-                ),
+                ("thesis", "thesis", Cell::known(design, |design| Cell::Whole(design.cycles))),
                 (
                     "difference_percent",
                     "difference",
-                    design.map_or(Cell::Missing, |design| {
+                    Cell::known(design, |design| {
                         scene.difference(cycles.total as f64, design.cycles as f64)
                     }),
                 ),
@@ -86,12 +82,12 @@ fn times(scene: &Scene) -> Table {
                     (
                         "thesis_ms",
                         "thesis ms",
-                        design.map_or(Cell::Missing, |design| Cell::Number(design.latency_ms, 2)),
+                        Cell::known(design, |design| Cell::Number(design.latency_ms, 2)),
                     ),
                     (
                         "difference_percent",
                         "difference",
-                        design.map_or(Cell::Missing, |design| {
+                        Cell::known(design, |design| {
                             scene.difference(time.seconds * 1e3, design.latency_ms)
                         }),
                     ),

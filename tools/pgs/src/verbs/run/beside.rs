@@ -7,12 +7,12 @@ use zynq_pgs::{Accelerator, StepParameters};
 
 use super::row::{Row, step};
 use super::summary::FinalState;
-use pgs_command::output::table::Column;
+use pgs_command::output::table::Fixed;
 
 /// The columns that the scene adds to the table of the run.
-pub(super) const COLUMNS: [Column; 2] = [
-    Column { name: "deepest", unit: "cold mm", width: 9 },
-    Column { name: "kinetic", unit: "cold kJ", width: 9 },
+pub(super) const COLUMNS: [Fixed; 2] = [
+    Fixed { name: "deepest", unit: "cold mm", width: 9 },
+    Fixed { name: "kinetic", unit: "cold kJ", width: 9 },
 ];
 
 /// The scene, and its last step.

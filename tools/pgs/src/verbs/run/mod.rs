@@ -37,7 +37,7 @@ use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
-use pgs_command::output::table::{Column, heading, line};
+use pgs_command::output::table::{Fixed, heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -368,7 +368,7 @@ fn take_steps(
 }
 
 /// The columns of the default table.
-fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Column> {
+fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
     let own = columns(is_emulated(opened));
     own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold)).collect()
 }
