@@ -15,17 +15,17 @@ pub struct BuildArgs {
     /// Design of the accelerator [default: float]
     #[arg(long, value_name = "PROFILE", value_parser = profile())]
     profile: Option<&'static Profile>,
-    /// Numbers on streams of 16 bits: binary16 is IEEE 754, rounded to nearest even; thesis16 is the
-    /// thesis' own, rounded by truncation, and has no zero; thesis16-literal cuts bits out of the
-    /// exponent even where a small number becomes a large one [default: binary16]
+    /// Numbers on streams of 16 bits: binary16 is IEEE 754, rounded to nearest even; thesis16 is
+    /// the thesis' own, rounded by truncation, and has no zero; thesis16-literal cuts bits out of
+    /// the exponent even where a small number becomes a large one [default: binary16]
     #[arg(long, value_parser = choice("format", |build| build.format))]
     format: Option<StreamFormat>,
     /// Precision of the pipeline's operators; storage keeps the width of the profile [default: the
     /// profile's]
     #[arg(long, value_parser = choice("arithmetic", |build| build.arithmetic))]
     arithmetic: Option<Precision>,
-    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with
-    /// every body [default: isotropic]
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed
+    /// with every body [default: isotropic]
     #[arg(long, value_parser = choice("inertia", |build| build.inertia))]
     inertia: Option<Inertia>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
@@ -54,14 +54,14 @@ pub struct BuildArgs {
         value_parser = number("address-width", |build| build.address_width)
     )]
     address_width: Option<u32>,
-    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K, at a
-    /// multiple of it [default: no fence]
+    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K,
+    /// at a multiple of it [default: no fence]
     #[arg(long, value_name = "BASE+BYTES", value_parser = number("fence", |build| build.fence))]
     fence: Option<Fence>,
     /// Threads of this machine
     ///
-    /// For the emulated board's arithmetic, for collision detection, and for packing and unpacking a
-    /// step; no result depends on their number [default: one per processor, at most 4]
+    /// For the emulated board's arithmetic, for collision detection, and for packing and unpacking
+    /// a step; no result depends on their number [default: one per processor, at most 4]
     #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
     threads: Option<usize>,
     /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]
@@ -137,7 +137,8 @@ pub fn described(config: &BoardConfig) -> String {
     let Numbers { collisions, bodies, poses, rows, updates, velocities, impulses } =
         variant.numbers;
     format!(
-        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates {}; on chip: \
+        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates \
+         {}; on chip: \
          velocities {}, impulses {})",
         collisions.name(),
         bodies.name(),
@@ -202,12 +203,14 @@ mod tests {
         };
         assert_eq!(
             of("half", |numbers| numbers.velocities = Precision::F32),
-            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: \
+             rows binary16, \
              updates binary16; on chip: velocities f32, impulses binary16)"
         );
         assert_eq!(
             of("half", |numbers| numbers.updates = Precision::F32),
-            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; \
+             arithmetic: rows binary16, \
              updates f32; on chip: velocities binary16, impulses binary16)"
         );
         assert_eq!(

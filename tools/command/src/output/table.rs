@@ -1,5 +1,5 @@
-//! A table of typed cells, and its four renderings: text, JSON, Markdown and HTML; and rows that are printed as
-//! they come.
+//! A table of typed cells, and its four renderings: text, JSON, Markdown and HTML; and rows that
+//! are printed as they come.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -355,7 +355,8 @@ mod tests {
     fn numbers_stand_at_the_right_and_words_at_the_left() {
         assert_eq!(
             table().to_text(80),
-            "A table\n  name      n    diff.\n          all\n  a|b   1,234  +0.17 %\n  <c>       -      \
+            "A table\n  name      n    diff.\n          all\n  a|b   1,234  +0.17 %\n  <c>       \
+             -      \
              2.0\n  * Said.\n"
         );
     }

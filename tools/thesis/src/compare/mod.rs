@@ -36,7 +36,8 @@ Examples:
   pgs thesis compare float,world naive,world --scene shapes --grid 8x8x8
 
 Examples with the Verilog in simulation (docs/bitstream.md):
-  pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator rtl:rtl-sim/pgs-rtl
+  pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator \
+  rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: binary16, thesis16, thesis16-literal (numbers on 16-bit streams), f32
@@ -87,7 +88,12 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every"])]
     input: Option<PathBuf>,
     /// Steps to take.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 120,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     steps: u32,
     /// Show every N-th step [default: a tenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]

@@ -57,7 +57,12 @@ pub(crate) struct FormatsArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
     input: Option<PathBuf>,
     /// Step of the scene whose numbers are measured; the steps before it are taken first.
-    #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 70,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     step: u32,
     #[command(flatten)]
     scene: SceneArgs,

@@ -202,8 +202,9 @@ mod tests {
         gather(&options(), &common, &Interrupt::install()).expect("a report")
     });
 
-    /// `tests/golden/report.json` has every cell of the tables, and every row of the index that is not
-    /// measured and needs no step of a pile, as recorded before the experiments had a crate of their own.
+    /// `tests/golden/report.json` has every cell of the tables, and every row of the index that is
+    /// not measured and needs no step of a pile, as recorded before the experiments had a crate of
+    /// their own.
     #[test]
     fn modelled_and_counted_figures_are_the_recorded_ones() {
         let golden: Value =
@@ -286,7 +287,8 @@ mod tests {
         serde_json::from_slice(&out).expect("a document")
     }
 
-    /// The rows of a report on steps that are found in the same report again, by the command of each.
+    /// The rows of a report on steps that are found in the same report again, by the command of
+    /// each.
     #[test]
     fn rows_of_formats_and_orders_have_the_figures_that_their_commands_print() {
         let percent = |value: &Value| value.as_f64().expect("a number");

@@ -1,5 +1,5 @@
-//! Steps the same scene beside a run, cold and with one friction: what a board without a warm start makes of
-//! it.
+//! Steps the same scene beside a run, cold and with one friction: what a board without a warm start
+//! makes of it.
 
 use scene::Scene;
 use serde_json::{Value, json};
@@ -31,8 +31,8 @@ pub(super) struct Beside {
     kinetic_energy: f64,
 }
 
-/// Whether the scene is stepped: as the user chooses, or by default unless the energy of a step is to be
-/// measured, to which the steps of two scenes would add up.
+/// Whether the scene is stepped: as the user chooses, or by default unless the energy of a step is
+/// to be measured, to which the steps of two scenes would add up.
 pub(super) fn is_stepped(choice: Option<bool>, by_default: bool, has_sensors: bool) -> bool {
     choice.unwrap_or(by_default && !has_sensors)
 }

@@ -124,8 +124,8 @@ impl Row {
     }
 }
 
-/// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins with
-/// the impulses of the last one.
+/// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins
+/// with the impulses of the last one.
 pub(super) fn step(
     number: u32,
     parameters: &StepParameters,

@@ -1,8 +1,8 @@
-//! The study `stopping`: what each rule by which the thesis ends an iterative solver (§2.2.3) costs in
-//! passes, and what a fixed number of passes leaves.
+//! The study `stopping`: what each rule by which the thesis ends an iterative solver (§2.2.3) costs
+//! in passes, and what a fixed number of passes leaves.
 //!
-//! The board takes the same step with 0, 1, 2 ... passes; the impulses and velocities that it gives out
-//! are judged on the host ([`residual`]). No other solver runs.
+//! The board takes the same step with 0, 1, 2 ... passes; the impulses and velocities that it gives
+//! out are judged on the host ([`residual`]). No other solver runs.
 
 mod passes;
 pub(crate) mod residual;
@@ -76,7 +76,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub(crate) steps: u32,
     /// Most passes of each kind.
-    #[arg(long, value_name = "K", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=255))]
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 64,
+        value_parser = clap::value_parser!(u32).range(2..=255)
+    )]
     pub(crate) passes: u32,
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
@@ -254,6 +259,6 @@ fn interrupted(options: &Options) -> Outcome {
     }
 }
 
-/// The order in which every number of passes solves the collisions: one, so that each pass goes on from
-/// the one before.
+/// The order in which every number of passes solves the collisions: one, so that each pass goes on
+/// from the one before.
 const ORDER: Order = Order::AsGiven;

@@ -15,8 +15,8 @@ pub(crate) struct Pass {
     pub(crate) residuals: Residuals,
     /// Largest change of an impulse in the last pass, N s; none before the first.
     pub(crate) largest_change_n_s: Option<f64>,
-    /// The largest change as a share of the impulse before the pass; none before the first, and where
-    /// an impulse has begun in the pass.
+    /// The largest change as a share of the impulse before the pass; none before the first, and
+    /// where an impulse has begun in the pass.
     pub(crate) largest_share: Option<f64>,
 }
 
@@ -39,8 +39,8 @@ pub(super) struct Course<'a> {
 }
 
 impl Course<'_> {
-    /// Takes the step with 0 to `most` passes, each number as contact and friction passes by `split`;
-    /// and whether Ctrl-C let all of them end.
+    /// Takes the step with 0 to `most` passes, each number as contact and friction passes by
+    /// `split`; and whether Ctrl-C let all of them end.
     pub(super) fn take(
         &mut self,
         most: u32,
@@ -78,8 +78,8 @@ impl Course<'_> {
         }))
     }
 
-    /// The velocities and impulses after the passes. Without a pass nothing has changed, and the board
-    /// takes no step.
+    /// The velocities and impulses after the passes. Without a pass nothing has changed, and the
+    /// board takes no step.
     fn solve(&mut self, [contact, friction]: [u32; 2]) -> Result<Option<Solved>, Failure> {
         let mut bodies = self.step.bodies.clone();
         if contact + friction == 0 {
