@@ -450,7 +450,7 @@ unsafe fn one_by_one<F: Computed, I: Form>(
                 // SAFETY: `run` has borrowed the inertias as a shared slice, so that no thread writes them.
                 unsafe { row.read() }
             });
-            masses[side] = Mass { inverse_mass: m, inverse_inertia, ..Mass::default() };
+            masses[side] = Mass { inverse_mass: m, inverse_inertia };
             beside[side] = k;
         }
         let mut impulses = block.impulses(lane);

@@ -92,7 +92,6 @@ impl Decoded {
         self.masses.extend(shapes.iter().map(|shape| Mass {
             inverse_mass: shape.inverse_mass,
             inverse_inertia: [shape.inverse_inertia, 0.0, 0.0, 0.0, 0.0, 0.0],
-            ..Mass::default()
         }));
         self.origin.iter_mut().for_each(Spans::clear);
         self.first = Brings::of(arguments, 0);

@@ -70,6 +70,9 @@ impl Options {
 /// A section prints its figures.
 type Outcome = Result<(), Box<dyn Error>>;
 
+/// Measures a section.
+type Measure = fn(&Options) -> Outcome;
+
 fn main() -> ExitCode {
     bench::exit_code(run(&Options::parse()))
 }
@@ -78,7 +81,7 @@ fn run(options: &Options) -> Outcome {
     if let Some(only) = options.only {
         return callgrind::run(only, options.profile.as_deref(), &options.step()?);
     }
-    let sections: [(Section, fn(&Options) -> Outcome); 3] = [
+    let sections: [(Section, Measure); 3] = [
         (Section::Solver, solver::measure),
         (Section::Instructions, callgrind::measure),
         (Section::A53, a53::measure),
