@@ -19,11 +19,12 @@ use serde_json::{Value, json};
 use step_folder::folder::Folder;
 use zynq_pgs::StepParameters;
 
-use self::side::{Side, World};
+use self::side::Side;
 use self::spec::SideSpec;
-use crate::deviation::StateDeviation;
+use crate::deviation::{StateDeviation, moving};
 use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
+use crate::study::run::World;
 use crate::table::Table;
 
 const EXAMPLES: &str = "\
@@ -241,7 +242,8 @@ impl Course {
         sides: &mut (Side<'a>, Side<'a>),
         session: &Session,
     ) -> Result<Taken, Failure> {
-        let moving = sides.0.world.moving();
+        let world = &sides.0.run.world;
+        let moving = moving(world.bodies(), world.shapes());
         let mut crew = Crew::new("compare", 1);
         if let Some(error) = crew.refused() {
             log::warn!("no thread of its own for board B, which takes its steps after A: {error}");
@@ -267,7 +269,7 @@ impl Course {
             session.advance();
             let fails = [&sides.0, &sides.1].map(|side| side.failed.as_ref().map(|f| f.step));
             let both_moved = a.is_some() && b.is_some();
-            let (one, other) = (sides.0.world.bodies(), sides.1.world.bodies());
+            let (one, other) = (sides.0.run.world.bodies(), sides.1.run.world.bodies());
             let deviation = both_moved.then(|| StateDeviation::of(one, other, &moving));
             last = Row { step: done, a, b, deviation };
             let fails_now = fails.contains(&Some(done));

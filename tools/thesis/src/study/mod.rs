@@ -5,7 +5,7 @@ pub(crate) mod half;
 pub(crate) mod ladder;
 pub(crate) mod pile;
 pub(crate) mod recorded;
-mod run;
+pub(crate) mod run;
 pub(crate) mod split;
 mod spread;
 pub(crate) mod stages;
