@@ -1,6 +1,7 @@
 //! Experiments that step a board, and measure again a claim of the thesis.
 
 pub(crate) mod determinism;
+pub(crate) mod given;
 pub(crate) mod half;
 pub(crate) mod ladder;
 pub(crate) mod pile;

@@ -4,9 +4,11 @@ use serde::Serialize;
 use zynq_pgs::{Body, Impulses};
 
 use super::residual::{Part, Problem, Residuals};
-use super::{ORDER, Session, Step};
+use super::{ORDER, Session};
+use crate::study::given::GivenStep;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
+use pgs_command::step_input;
 
 /// The state after a number of passes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -34,7 +36,7 @@ type Solved = (Vec<Body>, Vec<Impulses>);
 pub(super) struct Course<'a> {
     pub(super) opened: &'a mut OpenBoard,
     pub(super) session: &'a Session,
-    pub(super) step: &'a Step,
+    pub(super) step: &'a GivenStep,
     pub(super) problem: &'a Problem,
 }
 
@@ -98,7 +100,9 @@ impl Course<'_> {
         match accelerator.step(&mut bodies, &self.step.collisions, &parameters) {
             Ok(_) => {}
             Err(error) if board::is_cancelled(&error) => return Ok(None),
-            Err(error) => return Err(self.step.failure(self.opened, error)),
+            Err(error) => {
+                return Err(step_input::failure(self.step.folder.as_ref(), self.opened, error));
+            }
         }
         self.opened.alive()?;
         self.session.advance();
