@@ -72,7 +72,7 @@ pub struct ManagerOptions {
 }
 
 /// The option of a verb that may build an emulated board.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = HEADING)]
 pub struct AcceleratorOptions {
     /// Accelerator of an emulated board.
