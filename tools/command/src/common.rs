@@ -1,5 +1,5 @@
-//! Options that verbs share: output, and for verbs that open a board: the board, DMA memory, FPGA manager,
-//! accelerator.
+//! Options that verbs share: output, and for verbs that open a board: the board, DMA memory, FPGA
+//! manager, accelerator.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -29,9 +29,10 @@ pub struct BoardOptions {
     #[arg(
         help = "Board to use: auto, uio[:NODE], devmem, emulated, socket:PATH",
         long_help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), \
-                     uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for each \
-                     region), devmem (registers through /dev/mem, at the addresses of the interface; \
-                     needs root), emulated or socket:PATH (one that `pgs serve` serves) [env: \
+                     uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for \
+                     each region), devmem (registers through /dev/mem, at the addresses of the \
+                     interface; needs root), emulated or socket:PATH (one that `pgs serve` serves) \
+                     [env: \
                      PGS_BOARD] [default: auto]",
         long,
         value_name = "BOARD",
@@ -60,7 +61,8 @@ pub struct ManagerOptions {
     #[arg(
         help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
                 ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic \
-                that the kernel did not load, for example by JTAG. WARNING: an access to logic that \
+                that the kernel did not load, for example by JTAG. WARNING: an access to logic \
+                that \
                 is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
         long,
         value_name = "MANAGER",
@@ -70,14 +72,15 @@ pub struct ManagerOptions {
 }
 
 /// The option of a verb that may build an emulated board.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = HEADING)]
 pub struct AcceleratorOptions {
     /// Accelerator of an emulated board.
     #[arg(
         help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
-                Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the model \
-                beside it on the same beats, up to the first difference [env: PGS_RTL, the PATH of \
+                Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the \
+                model beside it on the same beats, up to the first difference [env: PGS_RTL, the \
+                PATH of \
                 rtl] [default: model]",
         long,
         value_name = "ACCELERATOR",
@@ -90,11 +93,11 @@ pub struct AcceleratorOptions {
 /// breaks no command that does not use it.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
-    /// A verb opens a board of any kind.
+    /// Present in a verb that opens a board of any kind.
     pub board: Option<BoardOptions>,
-    /// A verb asks the FPGA manager and opens no board.
+    /// Present in a verb that asks the FPGA manager, and opens no board.
     pub manager: Option<ManagerOptions>,
-    /// A verb may build an emulated board.
+    /// Present in a verb that may build an emulated board.
     pub accelerator: Option<AcceleratorOptions>,
 }
 

@@ -39,8 +39,8 @@ fn ignored_of(status: &str) -> Option<u64> {
     u64::from_str_radix(mask.trim(), 16).ok()
 }
 
-/// Starts a thread that calls `act` at each of the signals. The thread itself installs the handlers:
-/// if it does not start, the signals end the program as before.
+/// Starts a thread that calls `act` at each of the signals. The thread itself installs the
+/// handlers: if it does not start, the signals end the program as before.
 fn handle(signals: Vec<i32>, mut act: impl FnMut() + Send + 'static) -> io::Result<()> {
     let (tell, told) = mpsc::sync_channel(1);
     thread::Builder::new().name("interrupt".to_owned()).spawn(move || {

@@ -1,5 +1,5 @@
-//! Shared by the commands of `pgs` and the experiments of the thesis part: options, an open board, its
-//! failures, and output.
+//! Shared by the commands of `pgs` and the experiments of the thesis part: options, an open board,
+//! its failures, and output.
 
 #![forbid(unsafe_code)]
 

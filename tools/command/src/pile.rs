@@ -1,5 +1,5 @@
-//! A pile of cubes for a board, and the steps to the state in which a verb measures it: one way, so that
-//! "step 70 of the pile" is the same step everywhere.
+//! A pile of cubes for a board, and the steps to the state in which a verb measures it: one way, so
+//! that "step 70 of the pile" is the same step everywhere.
 
 use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::StepParameters;
@@ -41,11 +41,11 @@ pub fn open(
     Ok((scene, opened))
 }
 
-/// Takes steps, each after `go_on` agrees, and detects the collisions of the step behind them; false if
-/// `go_on` or Ctrl-C ended them.
+/// Takes steps, each after `go_on` agrees, and detects the collisions of the step behind them;
+/// false if `go_on` or Ctrl-C ended them.
 ///
-/// The collisions are solved in the order of their detection. A board that does not solve them one after
-/// the other would give a pile energy in this order, and takes the driver's.
+/// The collisions are solved in the order of their detection. A board that does not solve them one
+/// after the other would give a pile energy in this order, and takes the driver's.
 ///
 /// # Errors
 ///

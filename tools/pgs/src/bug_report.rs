@@ -23,8 +23,8 @@ pub(crate) struct FaultArgs {
     /// Repeat a failed step up to N times, if the board is ready for it after its reset
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
-    /// Write the data for a bug report to FILE after a fault: version, board, parameters, registers,
-    /// last accesses
+    /// Write the data for a bug report to FILE after a fault: version, board, parameters,
+    /// registers, last accesses
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

@@ -32,7 +32,8 @@ impl Footprint {
         let mb = |bytes: u64| bytes as f64 / 1e6;
         let (peak, times) = (peak()?, self.times()?);
         Some(format!(
-            "{:.1} MB at most, {times:.1} times the beats of a step ({:.1} MB) and the scene ({:.1} MB)",
+            "{:.1} MB at most, {times:.1} times the beats of a step ({:.1} MB) and the scene \
+             ({:.1} MB)",
             mb(peak),
             mb(self.beats),
             mb(self.scene),

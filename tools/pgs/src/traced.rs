@@ -68,7 +68,8 @@ impl TracedArgs {
         self.given().next().is_some()
     }
 
-    /// The board to record, if a step is to be recorded. A board outside this process has no recorder.
+    /// The board to record, if a step is to be recorded. A board outside this process has no
+    /// recorder.
     pub(crate) fn tracing(&self, opened: &OpenBoard) -> Result<Option<Tracing<'_>>, Failure> {
         let Some((name, _)) = self.given().next() else { return Ok(None) };
         self.given().try_for_each(|(_, path)| check_folder(path))?;
@@ -83,7 +84,8 @@ impl TracedArgs {
             _ => ("real", format!("leave out --{name}, or add --board emulated")),
         };
         let error = format!(
-            "--{name} shows the inside of an emulated board of this process, and this board is {kind}"
+            "--{name} shows the inside of an emulated board of this process, and this board is \
+             {kind}"
         );
         let accesses = "RUST_LOG=trace shows its register accesses";
         Err(Failure::input(error).next(format!("{next}; {accesses}")))
@@ -116,8 +118,8 @@ impl Tracing<'_> {
         self.board.record();
     }
 
-    /// Ends the recording and writes the files; all of them, or none. A step that failed or was interrupted
-    /// has no report.
+    /// Ends the recording and writes the files; all of them, or none. A step that failed or was
+    /// interrupted has no report.
     pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<TraceFiles, Failure> {
         match self.board.take_recording().filter(|recording| recording.span.clocks() > 0) {
             Some(recording) => self.write(&recording, report).map(|()| TraceFiles::Written),

@@ -121,7 +121,11 @@ impl ThesisArgs {
     /// The options of a board that the experiment has.
     #[must_use]
     pub fn given(&self) -> Given {
-        let Some((name, options)) = &self.one else { return Given::default() };
+        let Some((name, options)) = &self.one else {
+            // All of them step emulated boards.
+            let accelerator = self.all.is_asked().then(AcceleratorOptions::default);
+            return Given { accelerator, ..Given::default() };
+        };
         let boards = experiments().iter().find(|each| each.id() == name).map(|each| each.boards());
         let has = |least| boards.filter(|boards| *boards >= least);
         // The same parser has put the options there.

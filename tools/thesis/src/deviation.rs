@@ -2,7 +2,7 @@
 //!
 //! | measure | over | a component whose original is 0 |
 //! |---|---|---|
-//! | relative deviation, \|new - original\| / \|original\| (thesis eq. 4.1) | the others | is left out, and counted |
+//! | relative deviation, \|new - original\| / \|original\| (eq. 4.1) | the others | is left out, and counted |
 //! | share within 1 % | all components | is within if the new one is 0 too |
 //! | absolute difference, \|new - original\| | all components | counts like any other |
 
@@ -261,7 +261,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_do_not_deviate_from_themselves(numbers in prop::collection::vec(-1e30_f32..1e30, 0..50)) {
+        fn numbers_do_not_deviate_from_themselves(
+            numbers in prop::collection::vec(-1e30_f32..1e30, 0..50)
+        ) {
             let d = Deviation::of(numbers.iter().map(|&number| (number, number)));
             prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.nonzero(), d.components, 0));
             let sum = d.mean + d.largest + d.mean_absolute + d.largest_absolute;

@@ -81,6 +81,11 @@ impl Part {
         Self { complete: true, agrees: true, tables, data: json!({}), ..Self::default() }
     }
 
+    /// The part of an experiment that Ctrl-C ended before its first figure.
+    pub(crate) fn interrupted() -> Self {
+        Self { agrees: true, data: json!({}), ..Self::default() }
+    }
+
     /// Takes the members for programs from an outcome.
     pub(crate) fn with(mut self, outcome: &impl Serialize) -> Self {
         self.data = serde_json::to_value(outcome).unwrap_or_else(|_| json!({}));

@@ -232,7 +232,8 @@ impl Chart {
         let text = crate::table::escaped(text);
         let _ = writeln!(
             self.text,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" font-size=\"{size}\">{text}</text>"
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" \
+             font-size=\"{size}\">{text}</text>"
         );
     }
 
@@ -324,7 +325,8 @@ pub(crate) fn lines(x: Axis<'_>, y: Axis<'_>, series: &[Series]) -> String {
             let each: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
             let _ = writeln!(
                 chart.text,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"{dashes}/>",
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" \
+                 stroke-width=\"2\"{dashes}/>",
                 each.join(" ")
             );
         }
@@ -369,7 +371,8 @@ pub(crate) fn bars(
                 (chart.at(place + 0.06, value), chart.at(place + 0.94, 0.0));
             let _ = writeln!(
                 chart.text,
-                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{}\"/>",
+                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" \
+                 fill=\"{}\"/>",
                 right - left,
                 bottom - top,
                 colour(k)

@@ -91,8 +91,8 @@ impl Histogram {
         points
     }
 
-    /// The shares of the numbers by decade, among all whose original is not 0: the lower edge of the
-    /// decade in percent, and the share. The first is of the numbers below the lowest edge.
+    /// The shares of the numbers by decade, among all whose original is not 0: the lower edge of
+    /// the decade in percent, and the share. The first is of the numbers below the lowest edge.
     pub(crate) fn decades(&self) -> Vec<(f64, f64)> {
         let all = self.equal + self.below + self.above + self.counts.iter().sum::<u64>();
         let share = |count: u64| count as f64 / (all as f64).max(1.0);

@@ -81,8 +81,8 @@ impl Row {
     }
 }
 
-/// A key that sorts places of the thesis such as "§4.6.3, Figure 4.10": the numbers of the first section
-/// or chapter.
+/// A key that sorts places of the thesis such as "§4.6.3, Figure 4.10": the numbers of the first
+/// section or chapter.
 pub(crate) fn section_key(thesis: &str) -> Vec<u32> {
     let from = thesis.trim_start_matches(|letter: char| !letter.is_ascii_digit());
     let end = from.find(|letter: char| !letter.is_ascii_digit() && letter != '.');

@@ -13,8 +13,8 @@ pub(crate) enum NarrowFormat {
     /// The thesis' own format taken literally: three bits of the exponent are cut out, and reading
     /// guesses them from the bit before.
     Thesis16Literal,
-    /// A sign, `exponent` bits for the exponents up to `top`, and the other bits for the mantissa; cut off
-    /// as in the thesis' format, and as there small magnitudes become the smallest one.
+    /// A sign, `exponent` bits for the exponents up to `top`, and the other bits for the mantissa;
+    /// cut off as in the thesis' format, and as there small magnitudes become the smallest one.
     Split { exponent: u32, top: i32 },
 }
 
@@ -38,8 +38,8 @@ impl NarrowFormat {
         }
     }
 
-    /// Writes a number and reads it back. `None` for a NaN, and for a number that the driver refuses to
-    /// write; thesis16-literal has a word for every number, also for these.
+    /// Writes a number and reads it back. `None` for a NaN, and for a number that the driver
+    /// refuses to write; thesis16-literal has a word for every number, also for these.
     pub(crate) fn round_trip(self, value: f32) -> Option<f32> {
         let largest = match self {
             Self::Binary16 | Self::Thesis16 => StreamFormat::Binary16.largest(),
@@ -228,7 +228,8 @@ mod tests {
         #[test]
         fn between_its_limits_the_literal_format_is_ours(value in 3.1e-5_f32..65_504.0, minus: bool) {
             let value = if minus { -value } else { value };
-            prop_assert_eq!(bits(NarrowFormat::Thesis16Literal, value), bits(NarrowFormat::Thesis16, value));
+            let of = |format| bits(format, value);
+            prop_assert_eq!(of(NarrowFormat::Thesis16Literal), of(NarrowFormat::Thesis16));
         }
 
         #[test]

@@ -1,5 +1,5 @@
-//! Puts the accelerator that was chosen behind an emulated board: the model, a simulator of the generated
-//! Verilog, or both in lock step.
+//! Puts the accelerator that was chosen behind an emulated board: the model, a simulator of the
+//! generated Verilog, or both in lock step.
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError, LockStep, SimulatorProcess};
 use bitstream_model::{BoardConfig, EmulatedBoard};
@@ -61,7 +61,8 @@ pub fn emulated_board(
 /// The failure for an external accelerator that does not answer any more, or not as the model.
 pub(crate) fn dead(observer: Option<&EmulatedBoard>) -> Option<Failure> {
     let reason = observer?.accelerator_error()?;
-    let next = "no body was changed, and the next command starts a new simulator; one that is built with \
+    let next = "no body was changed, and the next command starts a new simulator; one that is \
+        built with \
                 `rtlgen simulator --waveform` shows the cycles before a difference from the model";
     Some(Failure::new(Cause::Hardware, reason).next(next))
 }

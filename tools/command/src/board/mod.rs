@@ -204,7 +204,8 @@ pub fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard, Failure> {
     open_as(common, build, build.config())
 }
 
-/// As [`open`], with an emulated board of this configuration: the build, and what a scene needs beside it.
+/// As [`open`], with an emulated board of this configuration: the build, and what a scene needs
+/// beside it.
 ///
 /// # Errors
 ///
@@ -236,8 +237,8 @@ pub fn is_cancelled(error: &zynq_pgs::Error) -> bool {
 }
 
 impl OpenBoard {
-    /// Says once on stderr that the emulated board stands in for a real one; for results that do not name
-    /// their board.
+    /// Says once on stderr that the emulated board stands in for a real one; for results that do
+    /// not name their board.
     pub fn stated(self) -> Self {
         static STATED: Once = Once::new();
         if self.stands_in {

@@ -19,8 +19,8 @@ pub struct BuildArgs {
     /// profile's]
     #[arg(long, value_parser = choice("arithmetic", |build| build.arithmetic))]
     arithmetic: Option<Precision>,
-    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with
-    /// every body [default: isotropic]
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed
+    /// with every body [default: isotropic]
     #[arg(long, value_parser = choice("inertia", |build| build.inertia))]
     inertia: Option<Inertia>,
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
@@ -49,14 +49,14 @@ pub struct BuildArgs {
         value_parser = number("address-width", |build| build.address_width)
     )]
     address_width: Option<u32>,
-    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K, at a
-    /// multiple of it [default: no fence]
+    /// The only memory that the DMA cores reach, as 0x50000000+64M: a power of two of at least 64K,
+    /// at a multiple of it [default: no fence]
     #[arg(long, value_name = "BASE+BYTES", value_parser = number("fence", |build| build.fence))]
     fence: Option<Fence>,
     /// Threads of this machine
     ///
-    /// For the emulated board's arithmetic, for collision detection, and for packing and unpacking a
-    /// step; no result depends on their number [default: one per processor, at most 4]
+    /// For the emulated board's arithmetic, for collision detection, and for packing and unpacking
+    /// a step; no result depends on their number [default: one per processor, at most 4]
     #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
     threads: Option<usize>,
     /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]
@@ -131,7 +131,8 @@ pub fn described(config: &BoardConfig) -> String {
     let Numbers { collisions, bodies, poses, rows, updates, velocities, impulses } =
         variant.numbers;
     format!(
-        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates {}; on chip: \
+        "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates \
+         {}; on chip: \
          velocities {}, impulses {})",
         collisions.name(),
         bodies.name(),
@@ -193,12 +194,14 @@ mod tests {
         };
         assert_eq!(
             of("half", |numbers| numbers.velocities = Precision::F32),
-            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+            "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: \
+             rows binary16, \
              updates binary16; on chip: velocities f32, impulses binary16)"
         );
         assert_eq!(
             of("half", |numbers| numbers.updates = Precision::F32),
-            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: rows binary16, \
+            "half,f32 (streams: collisions binary16, velocities binary16, poses binary16; \
+             arithmetic: rows binary16, \
              updates f32; on chip: velocities binary16, impulses binary16)"
         );
         for text in ["float", "naive,flush", "float,world", "half,f32"] {

@@ -13,8 +13,8 @@ use zynq_pgs::StepParameters;
 pub struct PlannedArgs {
     /// Make the board fail; `pgs faults --list` prints plans
     ///
-    /// `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`, several faults separated by
-    /// `;`, or `seed:N` for random ones. `pgs faults --list` prints thousands of plans.
+    /// `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`, several faults separated
+    /// by `;`, or `seed:N` for random ones. `pgs faults --list` prints thousands of plans.
     #[arg(long, value_name = "PLAN")]
     fault: Option<Planned>,
 }

@@ -31,9 +31,9 @@ pub const DROP: f32 = 1.0;
 pub struct SceneArgs {
     /// The falling bodies
     ///
-    /// The thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules, cylinders, convex hulls
-    /// of several masses), which need a board with world inertia: `pgs run` and `pgs thesis formats`
-    /// build such an emulated board themselves.
+    /// The thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules, cylinders, convex
+    /// hulls of several masses), which need a board with world inertia: `pgs run` and `pgs thesis
+    /// formats` build such an emulated board themselves.
     #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
     scene: SceneName,
     /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]
@@ -161,8 +161,8 @@ impl SceneArgs {
         self.grid.unwrap_or_else(|| if self.is_cubes() { Grid::default() } else { shapes() })
     }
 
-    /// The configuration of an emulated board of that build, with the inertia that the shapes need unless the
-    /// build names another.
+    /// The configuration of an emulated board of that build, with the inertia that the shapes need
+    /// unless the build names another.
     pub fn config(&self, build: &Build) -> BoardConfig {
         let inertia = (!self.is_cubes()).then_some(Form::World);
         Build { inertia: build.inertia.or(inertia), ..*build }.config()

@@ -19,8 +19,8 @@ pub struct SolverArgs {
     /// Time step, s: a number, or a fraction as 1/60
     #[arg(long, value_name = "S", value_parser = time_step)]
     dt: Option<f32>,
-    /// Share of the spin about the normal that each friction pass takes away, 0 to 1: 0 is off, 0.1 is
-    /// Bullet's
+    /// Share of the spin about the normal that each friction pass takes away, 0 to 1: 0 is off, 0.1
+    /// is Bullet's
     #[arg(long, value_name = "SHARE", value_parser = share)]
     spin_damping: Option<f32>,
 }
@@ -77,7 +77,8 @@ fn share(text: &str) -> Result<f32, String> {
 
 /// Longest time step, s. A longer one is a typing error.
 const TIME_STEP_MAX: f32 = 1.0;
-/// Shortest time step, s: the board computes its reciprocal, which is infinite for a subnormal number.
+/// Shortest time step, s: the board computes its reciprocal, which is infinite for a subnormal
+/// number.
 const TIME_STEP_MIN: f32 = f32::MIN_POSITIVE;
 
 /// Parses a time step.

@@ -16,8 +16,8 @@ pub fn fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
     labelled(out, label, LABEL, text, stdout_width())
 }
 
-/// Writes a text behind a label of `indent` columns, in lines of at most `columns`. Lines end between
-/// words; a word longer than a line stays whole.
+/// Writes a text behind a label of `indent` columns, in lines of at most `columns`. Lines end
+/// between words; a word longer than a line stays whole.
 ///
 /// # Errors
 ///

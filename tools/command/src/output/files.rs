@@ -109,8 +109,8 @@ impl Files {
         self
     }
 
-    /// Refuses an output that is another output, an input, or the file that stdout or stderr goes to.
-    /// Devices and pipes take any number of outputs.
+    /// Refuses an output that is another output, an input, or the file that stdout or stderr goes
+    /// to. Devices and pipes take any number of outputs.
     ///
     /// # Errors
     ///
@@ -134,8 +134,9 @@ impl Files {
     }
 }
 
-/// The device and the inode of a file; of a new one, the deepest folder above it that exists, and the path
-/// from there: equal for every path and link to the file. `None` for a device, a pipe or a folder.
+/// The device and the inode of a file; of a new one, the deepest folder above it that exists, and
+/// the path from there: equal for every path and link to the file. `None` for a device, a pipe or a
+/// folder.
 fn identity(path: &Path) -> Option<(u64, u64, PathBuf)> {
     if let Ok(found) = fs::metadata(path) {
         return found.is_file().then(|| (found.dev(), found.ino(), PathBuf::new()));

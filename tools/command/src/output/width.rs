@@ -15,8 +15,8 @@ pub fn stdout_width() -> usize {
     *FOUND.get_or_init(|| of_terminal(io::stdout()).unwrap_or(MOST))
 }
 
-/// Columns of a line on this terminal; `None` for a file, a pipe, and a terminal that does not know its
-/// width.
+/// Columns of a line on this terminal; `None` for a file, a pipe, and a terminal that does not know
+/// its width.
 pub fn of_terminal(stream: impl AsFd) -> Option<usize> {
     terminal_size_of(stream).map(|(Width(columns), _)| MOST.min(columns.into()))
 }

@@ -65,7 +65,8 @@ pub enum LoadError {
          bitstream, the vendor's (linux-xlnx) does", directory.display()
     )]
     NoFirmwareFile { manager: String, directory: PathBuf },
-    #[error("{manager} has no file \"flags\" in {}: it loads full bitstreams only", directory.display())]
+    #[error("{manager} has no file \"flags\" in {}: it loads full bitstreams \
+        only", directory.display())]
     NoFlags { manager: String, directory: PathBuf },
     #[error("{device} is open in {users}: DMA cores may be running")]
     InUse { device: String, users: String },
@@ -85,7 +86,8 @@ pub enum LoadError {
     #[error("the overlay {} is there already, {status}", directory.display())]
     OverlayPresent { directory: PathBuf, status: String },
     #[error(
-        "the UIO node {node:?} (/dev/{device}) is there already, from another overlay or from the base tree"
+        "the UIO node {node:?} (/dev/{device}) is there already, from another overlay or from the \
+         base tree"
     )]
     NodePresent { node: String, device: String },
     /// A file of the kernel.
@@ -103,7 +105,8 @@ pub enum LoadError {
     )]
     NotOperating { manager: String, state: String, detail: String },
     #[error(
-        "the bitstream is loaded, but the kernel did not apply the overlay: expected status \"applied\", found {status:?}"
+        "the bitstream is loaded, but the kernel did not apply the overlay: expected status \
+         \"applied\", found {status:?}"
     )]
     NotApplied { status: String, source: Option<io::Error> },
     #[error("the bitstream is loaded and the overlay applied, but there is no UIO node \"pgs\"")]
@@ -211,7 +214,8 @@ impl LoadError {
             Self::Unasked => "leave out --manager, or name one, as fpga0".to_owned(),
             Self::NoManager { .. } => {
                 "on the board: boot a kernel with CONFIG_FPGA_MGR_ZYNQMP_FPGA and a tree with its \
-                 node; elsewhere there is nothing to load, and the other verbs take --board emulated"
+                 node; elsewhere there is nothing to load, and the other verbs take --board \
+                 emulated"
                     .to_owned()
             }
             Self::NoFirmwareFile { .. } => {
@@ -350,7 +354,8 @@ fn refused(firmware: &str, source: &io::Error) -> String {
             "another program is loading: wait for it to end, then retry".to_owned()
         }
         io::ErrorKind::OutOfMemory => {
-            "the kernel has no memory in one piece for the bitstream: enlarge its CMA pool (cma=256M \
+            "the kernel has no memory in one piece for the bitstream: enlarge its CMA pool \
+             (cma=256M \
              on its command line), or load after a reboot"
                 .to_owned()
         }
@@ -359,7 +364,8 @@ fn refused(firmware: &str, source: &io::Error) -> String {
              power in order? dmesg | tail says more"
                 .to_owned()
         }
-        _ => "look into dmesg; is it a .bit.bin for this chip, made by bootgen -arch zynqmp? Do not \
+        _ => "look into dmesg; is it a .bit.bin for this chip, made by bootgen -arch zynqmp? Do \
+            not \
               touch the registers before the state is operating"
             .to_owned(),
     }

@@ -104,7 +104,8 @@ impl Energy {
             })
             .collect();
         format!(
-            "measured: {}; {} samples idle and {} busy; ± two standard errors and the sensors' gain, \
+            "measured: {}; {} samples idle and {} busy; ± two standard errors and the sensors' \
+             gain, \
              without the tolerance of the shunts",
             parts.join("; "),
             self.idle.samples,
@@ -134,11 +135,13 @@ impl Energy {
     }
 }
 
-/// The energy of a step that takes `ms` milliseconds, at the thesis' power, for boards without sensors.
+/// The energy of a step that takes `ms` milliseconds, at the thesis' power, for boards without
+/// sensors.
 pub(crate) fn at_thesis_power(ms: f64) -> (String, Value) {
     let joules = ZCU102_WATTS * ms / 1e3;
     let text = format!(
-        "{joules:.3} J a step at {ZCU102_WATTS} W, the power that the thesis takes for the board: not \
+        "{joules:.3} J a step at {ZCU102_WATTS} W, the power that the thesis takes for the board: \
+         not \
          measured"
     );
     (text, json!({ "origin": "recorded", "watts": ZCU102_WATTS, "joules_a_step": joules }))

@@ -51,8 +51,8 @@ impl PowerMeter {
         Ok(Self { sensors, idle, started: Instant::now(), stop, thread, taken })
     }
 
-    /// Ends the sampling; the energy of each of `steps` steps. `None` if the steps took less time than a
-    /// sensor needs for a value.
+    /// Ends the sampling; the energy of each of `steps` steps. `None` if the steps took less time
+    /// than a sensor needs for a value.
     ///
     /// # Errors
     /// [`SensorError`] if a sensor could not be read during the steps.
@@ -70,8 +70,8 @@ impl PowerMeter {
     }
 }
 
-/// Reads the sensors once an interval, at most `count` times, until the sender of `stopped` is gone.
-/// Counts the samples in `taken`.
+/// Reads the sensors once an interval, at most `count` times, until the sender of `stopped` is
+/// gone. Counts the samples in `taken`.
 fn sample(
     sensors: &Sensors,
     stopped: &Receiver<()>,

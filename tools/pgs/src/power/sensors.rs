@@ -16,8 +16,8 @@ const INTERVAL_MIN: Duration = Duration::from_millis(10);
 const INTERVAL_MAX: Duration = Duration::from_secs(2);
 /// Time between two samples of sensors that do not say it.
 const INTERVAL: Duration = Duration::from_millis(35);
-/// Largest gain error of the power: 0.1 % of the shunt voltage and 0.1 % of the bus voltage (data sheet
-/// SBOS547).
+/// Largest gain error of the power: 0.1 % of the shunt voltage and 0.1 % of the bus voltage (data
+/// sheet SBOS547).
 pub(super) const GAIN_ERROR: f64 = 0.002;
 
 /// The part of the chip that a rail supplies.
@@ -48,7 +48,8 @@ impl Domain {
 }
 
 /// Rails by the designator of their sensor (UG1182, tables of the power rails and of the I2C
-/// multiplexer U60). Rails of transceivers and of the FMC connectors are left out: no step uses them.
+/// multiplexer U60). Rails of transceivers and of the FMC connectors are left out: no step uses
+/// them.
 const RAILS: [(&str, &str, Domain); 12] = [
     ("u79", "VCCINT", Domain::Logic),
     ("u81", "VCCBRAM", Domain::Logic),
@@ -150,7 +151,8 @@ impl Sensors {
         let interval = interval.unwrap_or(INTERVAL).max(INTERVAL_MIN);
         if logic && interval > INTERVAL_MAX {
             log::warn!(
-                "the power is not measured: expected sensors with a new value every {INTERVAL_MAX:?} or \
+                "the power is not measured: expected sensors with a new value every \
+                 {INTERVAL_MAX:?} or \
                  less, found {interval:?}; write a smaller update_interval under {}",
                 hwmon.display()
             );

@@ -31,8 +31,8 @@ Examples on a board:
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, fence; a failure
-/// names the next step.
+/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, fence; a
+/// failure names the next step.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {

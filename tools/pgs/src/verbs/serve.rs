@@ -91,7 +91,8 @@ pub(crate) fn run(
                  (docker run --memory)",
             ),
             error @ ServeError::Socket { .. } => Failure::input(error).next(
-                "name a socket with --socket whose folder is there and may be written to, and whose \
+                "name a socket with --socket whose folder is there and may be written to, and \
+                 whose \
                  path has at most 107 bytes",
             ),
             error => Failure::input(error),

@@ -46,19 +46,22 @@ Examples:
 The folder holds one .npy array a property, in C order; metres, kilograms, seconds, radians, world
 frame:
 
-  params            (8) <f4        time step, position drift, position coefficient, friction, angular
+  params            (8) <f4        time step, position drift, position coefficient, friction, \
+  angular
                                    damping, gravity x, y, z
   iterations        (2) <u4        contact, friction
   body_pos          (N, 3) <f4     centre of mass
   body_quat         (N, 4) <f4     orientation, a unit quaternion in the order x, y, z, w
   body_linvel       (N, 3) <f4     velocity of the centre of mass
   body_angvel       (N, 3) <f4     angular velocity about world axes
-  body_inv_mass     (N) <f4        1/mass; 0 is a static body, whose velocities and inverse inertia are 0
+  body_inv_mass     (N) <f4        1/mass; 0 is a static body, whose velocities and inverse \
+  inertia are 0
   body_inv_inertia  (N, 3) <f4     inverse inertia about the body's own axes x, y, z
   contact_bodies    (M, 2) <u4     indices of bodies A and B, from 0
   contact_npoints   (M) <u4        contact points of each collision, 0 to 4
   contact_normal    (M, 3) <f4     unit normal, which points from B to A
-  contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d from A,
+  contact_points    (M, 4, 4) <f4  x, y, z of a point on B's surface, and its signed distance d \
+  from A,
                                    whose surface is at point + d * normal; negative for penetration.
                                    Only the first contact_npoints of the four are read
 

@@ -1,5 +1,5 @@
-//! `--accelerator rtl:PATH`: a program that is no simulator is refused by name. Steps on a real one are
-//! in `tools/scripts/rtl-test.sh`, which builds it.
+//! `--accelerator rtl:PATH`: a program that is no simulator is refused by name. Steps on a real one
+//! are in `tools/scripts/rtl-test.sh`, which builds it.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -18,8 +18,9 @@ fn solve(accelerator: &str, more: &[&str]) -> (Option<i32>, String) {
 
 fn program(folder: &Path, text: &str) -> String {
     let path = folder.join("simulator");
-    // Another process writes the file. Written here, a child that another test starts at this moment
-    // would inherit the open file, and the kernel refuses to execute a file open for writing.
+    // Another process writes the file. Written here, a child that another test starts at this
+    // moment would inherit the open file, and the kernel refuses to execute a file open for
+    // writing.
     let writes = "printf %s \"$1\" > \"$0\" && chmod 755 \"$0\"";
     let written = Command::new("sh").args(["-c", writes]).arg(&path).arg(text).status();
     assert!(written.expect("a shell").success());
@@ -55,8 +56,8 @@ fn another_profile_than_the_generated_one_is_refused() {
     assert!(stderr.contains("of profile float, not half"), "{stderr}");
 }
 
-/// A program that answers the reads of IDENTIFICATION and FEATURES as an interlocked accelerator with
-/// isotropic inertia.
+/// A program that answers the reads of IDENTIFICATION and FEATURES as an interlocked accelerator
+/// with isotropic inertia.
 #[test]
 fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -96,8 +97,8 @@ fn a_board_is_not_served_without_its_simulator() {
 #[test]
 fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
     let folder = tempfile::tempdir().expect("a folder");
-    // It answers the first four requests: the identification, the features of an interlocked accelerator,
-    // and no fence.
+    // It answers the first four requests: the identification, the features of an interlocked
+    // accelerator, and no fence.
     let words = "1SGP\\001\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000";
     let four_requests = format!("printf '{words}'\nhead -c 48 >/dev/null\n");
     let ends = program(folder.path(), &format!("#!/bin/sh\n{four_requests}"));

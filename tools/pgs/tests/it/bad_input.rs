@@ -270,7 +270,10 @@ proptest! {
             }
             fs::write(&path, bytes).expect("the array");
         }
-        for (verb, options) in [(&["solve", "--compare"][..], STAGES[stage]), (&["thesis", "detection"], &["--input"])] {
+        for (verb, options) in [
+            (&["solve", "--compare"][..], STAGES[stage]),
+            (&["thesis", "detection"], &["--input"]),
+        ] {
             let mut pgs = pgs();
             let output = pgs.args(verb).args(options).arg(folder.path()).output();
             let ran = Ran::from(output.expect("it starts"));

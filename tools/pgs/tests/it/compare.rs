@@ -1,6 +1,6 @@
-//! `pgs thesis compare` and `pgs thesis formats` keep their promises: zero differences between equal boards,
-//! measures that a reader can compute by hand, the rest after a board fails, and the figures of the
-//! full step.
+//! `pgs thesis compare` and `pgs thesis formats` keep their promises: zero differences between
+//! equal boards, measures that a reader can compute by hand, the rest after a board fails, and the
+//! figures of the full step.
 
 use crate::common::{Ran, copy, golden, near, number, patch, run, skipped, variable};
 use serde_json::Value;

@@ -35,6 +35,28 @@ fn a_blank_variable_is_unset() {
     }
 }
 
+/// Commands that build emulated boards of their own do not run on these without a word.
+#[test]
+fn a_board_of_the_environment_that_is_not_taken_is_named() {
+    let said = |words: &[&str], board: &str| {
+        let mut command = pgs();
+        command.args(words).env("PGS_BOARD", board).env("RUST_LOG", "warn");
+        let ran: Ran = command.output().expect("it starts").into();
+        assert_eq!(ran.code, Some(0), "{words:?}: {}", ran.stderr);
+        ran.stderr
+    };
+    let own = "PGS_BOARD is \"uio\": this command builds emulated boards of its own";
+    let half = ["thesis", "half", "--grid", "1x1x1", "--steps", "1", "--build", "half"];
+    for words in [&["faults", "--list", "--profile", "naive"][..], &half] {
+        assert!(said(words, "uio").contains(own), "{words:?}");
+        for same in ["", "auto", "emulated"] {
+            assert_eq!(said(words, same), "", "{words:?}");
+        }
+    }
+    // No board at all.
+    assert_eq!(said(&["thesis", "step"], "uio"), "");
+}
+
 #[test]
 fn a_wrong_variable_is_named_where_it_is_needed_and_nowhere_else() {
     let wrong = [("PGS_BOARD", "abacus"), ("PGS_MEMORY", "drum")];

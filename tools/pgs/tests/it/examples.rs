@@ -1,8 +1,8 @@
-//! Every command that `README.md`, the pages and each `--help` print runs in a clone, or stands in a
-//! block or below a heading that names its need.
+//! Every command that `README.md`, the pages and each `--help` print runs in a clone, or stands in
+//! a block or below a heading that names its need.
 //!
-//! A debug build runs scenes in small and leaves out the longest commands; a release build, in the stage
-//! `examples`, runs all of them as they are printed.
+//! A debug build runs scenes in small and leaves out the longest commands; a release build, in the
+//! stage `examples`, runs all of them as they are printed.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -55,7 +55,8 @@ fn helps() -> BTreeMap<Vec<String>, String> {
     helps
 }
 
-/// The examples of a help: the lines with a command below `Examples:`, or below `Examples on a board:`.
+/// The examples of a help: the lines with a command below `Examples:`, or below `Examples on a
+/// board:`.
 fn of_help(verb: &[String], help: &str) -> Vec<Example> {
     let mut examples = Vec::new();
     let mut need = None;

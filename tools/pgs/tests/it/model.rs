@@ -1,4 +1,5 @@
-//! The formulas of `pgs thesis` show every table of the thesis beside ours, as text, Markdown and JSON.
+//! The formulas of `pgs thesis` show every table of the thesis beside ours, as text, Markdown and
+//! JSON.
 
 use std::collections::BTreeSet;
 

@@ -1,5 +1,5 @@
-//! `pgs thesis order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the thesis'
-//! scene, whose figures were measured outside this project.
+//! `pgs thesis order`: its table, on the scenes of the repository and, with `PGS_VECTORS`, on the
+//! thesis' scene, whose figures were measured outside this project.
 
 use std::path::PathBuf;
 

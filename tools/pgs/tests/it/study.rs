@@ -1,4 +1,5 @@
-//! Experiments of `pgs thesis` that step a board: their figures agree with each other, and with `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
+//! Experiments of `pgs thesis` that step a board: their figures agree with each other, and with
+//! `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
 
 use crate::common::{
     copy, golden, near, number, run, skipped, text, variable, write as write_array,
@@ -154,8 +155,8 @@ fn a_pile_in_half_keeps_moving_and_one_in_f32_does_not() {
     assert_eq!(document["float_kinetic_energy_j"].as_array().map(Vec::len), Some(151));
 }
 
-/// Verbs that step a pile to a state lead to the same one: `formats` counts the step that it measures, a
-/// study the steps before, and `half` shows the numbers of the step behind its last.
+/// Verbs that step a pile to a state lead to the same one: `formats` counts the step that it
+/// measures, a study the steps before, and `half` shows the numbers of the step behind its last.
 #[test]
 fn a_step_of_the_pile_is_the_same_in_every_verb() {
     let formats = run(["thesis", "formats", "--grid", "4x4x4", "--step", "50", "--json"]).json();

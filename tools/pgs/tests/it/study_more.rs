@@ -1,5 +1,5 @@
-//! Experiments of `pgs thesis` about the time step, stopping rules, the shares of a step and the ladder of designs:
-//! figures that a reader can compute by hand, and refusals.
+//! Experiments of `pgs thesis` about the time step, stopping rules, the shares of a step and the
+//! ladder of designs: figures that a reader can compute by hand, and refusals.
 
 use crate::common::{golden, near, number, run, text};
 use serde_json::Value;

@@ -1,4 +1,5 @@
-//! The files that show the inside of a step: what they have, who gets them, and the picture of the README.
+//! The files that show the inside of a step: what they have, who gets them, and the picture of the
+//! README.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};

@@ -19,11 +19,12 @@ use serde_json::{Value, json};
 use step_folder::folder::Folder;
 use zynq_pgs::StepParameters;
 
-use self::side::{Side, World};
+use self::side::Side;
 use self::spec::SideSpec;
-use crate::deviation::StateDeviation;
+use crate::deviation::{StateDeviation, moving};
 use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
+use crate::study::run::World;
 use crate::table::Table;
 
 const EXAMPLES: &str = "\
@@ -36,7 +37,8 @@ Examples:
   pgs thesis compare float,world float,world,unchecked --scene shapes --grid 8x8x8
 
 Examples with the Verilog in simulation (docs/bitstream.md):
-  pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator rtl:rtl-sim/pgs-rtl
+  pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator \
+  rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: f32, binary16 (arithmetic), interlocked, unchecked, keep, flush, isotropic, world; or window=SLOTS,
@@ -86,7 +88,12 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every"])]
     input: Option<PathBuf>,
     /// Steps to take.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 120,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     steps: u32,
     /// Show every N-th step [default: a tenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -234,7 +241,8 @@ impl Course {
         sides: &mut (Side<'a>, Side<'a>),
         session: &Session,
     ) -> Result<Taken, Failure> {
-        let moving = sides.0.world.moving();
+        let world = &sides.0.run.world;
+        let moving = moving(world.bodies(), world.shapes());
         let mut crew = Crew::new("compare", 1);
         if let Some(error) = crew.refused() {
             log::warn!("no thread of its own for board B, which takes its steps after A: {error}");
@@ -260,7 +268,7 @@ impl Course {
             session.advance();
             let fails = [&sides.0, &sides.1].map(|side| side.failed.as_ref().map(|f| f.step));
             let both_moved = a.is_some() && b.is_some();
-            let (one, other) = (sides.0.world.bodies(), sides.1.world.bodies());
+            let (one, other) = (sides.0.run.world.bodies(), sides.1.run.world.bodies());
             let deviation = both_moved.then(|| StateDeviation::of(one, other, &moving));
             last = Row { step: done, a, b, deviation };
             let fails_now = fails.contains(&Some(done));

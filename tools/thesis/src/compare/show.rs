@@ -120,7 +120,8 @@ pub(super) fn end(part: &mut Part, side: &Side<'_>, measured: Option<&Measured>)
     if let Some(Measured { kinetic, momentum, penetration, .. }) = measured {
         let Penetration { contacts, penetrating, .. } = penetration;
         let text = format!(
-            "{:.3} J translational, {:.3} J rotational; {} N s, {} N m s; {} of {} contacts penetrate",
+            "{:.3} J translational, {:.3} J rotational; {} N s, {} N m s; {} of {} contacts \
+             penetrate",
             kinetic.translational,
             kinetic.rotational,
             three(momentum.linear),

@@ -1,51 +1,22 @@
 //! Steps one of the two compared boards and measures its state.
 
 use scene::{
-    KineticEnergy, Momentum, Penetration, Scene, carry_along, kinetic_energy_parts, momentum,
-    penetration, potential_energy,
+    KineticEnergy, Momentum, Penetration, carry_along, kinetic_energy_parts, momentum, penetration,
+    potential_energy,
 };
 use serde_json::{Value, json};
-use zynq_pgs::{Body, Collision, Error, Fault, InputError, Shape, StepParameters, StepReport};
+use zynq_pgs::{Body, Collision, Error, Fault, InputError, StepParameters, StepReport};
 
 use super::spec::SideSpec;
 use crate::deviation::{moving, unmoved_share};
 use crate::narrow::{NarrowFormat, carried};
-use crate::permutation::{self, Arranger, Permutation};
+use crate::permutation::{self, Permutation};
+use crate::study::run::{Run, World};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{BoardName, CommonArgs};
 use pgs_command::failure::Failure;
 use pgs_command::step_input;
 use step_folder::digest;
-use step_folder::folder::Folder;
-
-/// The bodies and collisions that a board steps.
-pub(super) enum World<'a> {
-    /// A scene, whose collisions are detected after every step.
-    Scene(Box<Scene>),
-    /// One step from a folder of arrays, without the shapes' geometry.
-    Folder { folder: &'a Folder, bodies: Vec<Body> },
-}
-
-impl World<'_> {
-    pub(super) fn bodies(&self) -> &[Body] {
-        match self {
-            Self::Scene(scene) => scene.bodies(),
-            Self::Folder { bodies, .. } => bodies,
-        }
-    }
-
-    fn shapes(&self) -> &[Shape] {
-        match self {
-            Self::Scene(scene) => scene.shapes(),
-            Self::Folder { folder, .. } => &folder.shapes,
-        }
-    }
-
-    /// Whether each body can move.
-    pub(super) fn moving(&self) -> Vec<bool> {
-        moving(self.bodies(), self.shapes())
-    }
-}
 
 /// The measures of a state.
 pub(super) struct Measured {
@@ -101,9 +72,8 @@ pub(super) struct Side<'a> {
     pub(super) name: &'static str,
     pub(super) spec: SideSpec,
     pub(super) opened: OpenBoard,
-    pub(super) world: World<'a>,
+    pub(super) run: Run<'a>,
     pub(super) failed: Option<Failed>,
-    arranger: Option<Arranger>,
     gravity: [f32; 3],
 }
 
@@ -133,22 +103,14 @@ impl<'a> Side<'a> {
             }
             _ => None,
         };
-        let arranger = spec.permutation.map(|order| Arranger::new(order, recorded));
-        Ok(Self { name, spec, opened, world, failed: None, arranger, gravity })
+        let run = Run::new(world, spec.permutation, recorded);
+        Ok(Self { name, spec, opened, run, failed: None, gravity })
     }
 
     /// Detects the collisions of the first step and measures the start.
     pub(super) fn start(&mut self) -> Measured {
-        match &mut self.world {
-            World::Scene(scene) => {
-                let collisions = scene.detect().to_vec();
-                self.measure(&collisions, None, None)
-            }
-            World::Folder { folder, .. } => {
-                let folder: &'a Folder = folder;
-                self.measure(&folder.collisions, None, None)
-            }
-        }
+        let collisions = self.run.world.collisions();
+        self.measure(&collisions, None, None)
     }
 
     /// Takes a step and measures the state after it; none if the board has failed.
@@ -158,28 +120,18 @@ impl<'a> Side<'a> {
         }
         let capabilities = self.opened.accelerator.capabilities();
         let parameters = &self.spec.ordering.apply_to_compare(*parameters, capabilities);
-        let before = self.world.bodies().to_vec();
-        let accelerator = &mut self.opened.accelerator;
-        let shapes = self.world.shapes().to_vec();
-        let (bodies, collisions) = match &mut self.world {
-            World::Scene(scene) => scene.parts_mut(),
-            World::Folder { folder, bodies } => (&mut bodies[..], &folder.collisions[..]),
-        };
-        let collisions = match &mut self.arranger {
-            Some(arranger) => arranger.arrange(bodies, &shapes, collisions),
-            None => collisions,
-        };
-        let stepped = accelerator.step(bodies, collisions, parameters);
+        let before = self.run.world.bodies().to_vec();
+        let stepped = self.run.take(&mut self.opened, parameters);
         let report = match stepped {
             Ok(report) => report,
             Err(error) => {
                 let body = body_of(&error);
-                let failure = failure(&self.opened, &self.world, error);
+                let failure = failure(&self.opened, &self.run.world, error);
                 self.failed = Some(Failed { step: number, body, failure });
                 return None;
             }
         };
-        let collisions = match &mut self.world {
+        let collisions = match &mut self.run.world {
             World::Scene(scene) => scene.detect().to_vec(),
             World::Folder { folder, bodies } => carry_along(&folder.collisions, &before, bodies),
         };
@@ -192,7 +144,7 @@ impl<'a> Side<'a> {
         before: Option<&[Body]>,
         report: Option<StepReport>,
     ) -> Measured {
-        let (bodies, shapes) = (self.world.bodies(), self.world.shapes());
+        let (bodies, shapes) = (self.run.world.bodies(), self.run.world.shapes());
         Measured {
             collisions: collisions.len() as u64,
             kinetic: kinetic_energy_parts(bodies, shapes),
@@ -200,7 +152,7 @@ impl<'a> Side<'a> {
             momentum: momentum(bodies, shapes),
             penetration: penetration(collisions),
             unmoved: before.map(|before| {
-                unmoved_share(before, bodies, &self.world.moving(), |value| self.carried(value))
+                unmoved_share(before, bodies, &moving(bodies, shapes), |value| self.carried(value))
             }),
             report,
         }
@@ -212,7 +164,7 @@ impl<'a> Side<'a> {
     }
 
     pub(super) fn digest(&self) -> String {
-        format!("{:016x}", digest::of_bodies(self.world.bodies()))
+        format!("{:016x}", digest::of_bodies(self.run.world.bodies()))
     }
 
     /// The board for programs.

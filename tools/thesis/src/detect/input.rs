@@ -27,7 +27,8 @@ enum Problem {
     )]
     GroundMoves { found: f32 },
     #[error(
-        "expected one static body, the ground, found body {body} with inverse mass 0: leave it out, \
+        "expected one static body, the ground, found body {body} with inverse mass 0: leave it \
+         out, \
          or give it a mass"
     )]
     OtherStatic { body: usize },
@@ -41,15 +42,18 @@ enum Problem {
     )]
     Again { collision: usize, a: u32, b: u32 },
     #[error(
-        "collision {collision}: expected at most {CONTACT_POINTS} points, found {found}: leave the others out"
+        "collision {collision}: expected at most {CONTACT_POINTS} points, found {found}: leave \
+         the others out"
     )]
     Count { collision: usize, found: u32 },
     #[error(
-        "collision {collision}: expected a normal of length 1, found {found:?}: divide it by its length"
+        "collision {collision}: expected a normal of length 1, found {found:?}: divide it by its \
+         length"
     )]
     Normal { collision: usize, found: [f32; 3] },
     #[error(
-        "collision {collision}, point {point}: expected finite numbers, found {found:?}: correct them"
+        "collision {collision}, point {point}: expected finite numbers, found {found:?}: correct \
+         them"
     )]
     Point { collision: usize, point: usize, found: [f32; 4] },
 }

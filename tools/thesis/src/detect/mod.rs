@@ -28,7 +28,8 @@ The folder is one for `pgs solve`. Body 0 is the ground, a box of 800 m whose to
 other body is a cube of 2 m, as in Bullet's demo: a folder says nothing of shapes. Two bodies up to
 2 cm apart collide.
 
-The exit code is 1 if a pair deeper than 1 mm is missing or extra. Every normal more than 0.01 degrees off and every point
+The exit code is 1 if a pair deeper than 1 mm is missing or extra. Every normal more than 0.01 \
+degrees off and every point
 more than 1 mm off is counted under its cause:
 
   apart     the cubes are apart along a face of B and along none of A; the folder's axis is across

@@ -54,7 +54,8 @@ pub(super) fn part(comparison: &Comparison, scene: &Scene) -> Part {
     part.agrees = comparison.agrees();
     let depth = penetration(scene.collisions());
     let collisions = format!(
-        "{} of {} bodies, {} of them with the ground; {} points, {} of them penetrating, {} mm deep \
+        "{} of {} bodies, {} of them with the ground; {} points, {} of them penetrating, {} mm \
+         deep \
          at most",
         grouped(scene.collisions().len() as u64),
         grouped(scene.bodies().len() as u64),

@@ -7,7 +7,8 @@
 //!
 //! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
 //!
-//! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this project's.
+//! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this
+//! project's.
 
 use super::designs::Window;
 use super::traffic::{Records, StepTraffic};
@@ -30,11 +31,11 @@ pub struct StepShape {
 impl StepShape {
     /// Four contact and four friction passes.
     ///
-    /// The thesis prints no number of passes; its Algorithm 2 has an "iteration limit" (§2.2.3). Eight
-    /// are inferred from its cycles: a pass over 127,000 collisions (§4.4.1) takes 254,000 cycles in
-    /// float, and eight leave 30,697 of Table 6.4's 2,062,697 for load and integration, which take
-    /// 31,590 by the formula. In half a pass takes 190,500, and eight leave 33,317 of Table 6.8's
-    /// 1,557,317. The golden steps of Bullet have four passes of each kind.
+    /// The thesis prints no number of passes; its Algorithm 2 has an "iteration limit" (§2.2.3).
+    /// Eight are inferred from its cycles: a pass over 127,000 collisions (§4.4.1) takes 254,000
+    /// cycles in float, and eight leave 30,697 of Table 6.4's 2,062,697 for load and integration,
+    /// which take 31,590 by the formula. In half a pass takes 190,500, and eight leave 33,317 of
+    /// Table 6.8's 1,557,317. The golden steps of Bullet have four passes of each kind.
     #[must_use]
     pub const fn new(bodies: u64, collisions: u64) -> Self {
         Self { bodies, collisions, contact_iterations: 4, friction_iterations: 4 }

@@ -1,8 +1,8 @@
 //! The designs of the formulas: the profiles, and three of this project that are no boards.
 //!
 //! `mixed`, `windowed` and `windowed16` were left as boards: no hardware has them, and no processor
-//! of this class can order collisions for the last two, whose order keeps few bodies alive. Ordering
-//! one heavy step takes 28 to 50 ms on x86, for 2.1 ms of board.
+//! of this class can order collisions for the last two, whose order keeps few bodies alive.
+//! Ordering one heavy step takes 28 to 50 ms on x86, for 2.1 ms of board.
 //!
 //! Their collision records are relative to body A, six rows:
 //!

@@ -130,8 +130,9 @@ impl PortUse {
 /// Writes to an array of bodies while the velocities come in, against the ports that write them.
 ///
 /// Each record is one row of every array of bodies, in every copy. Block RAM writes a row on each
-/// of its ports. If that is too slow, the array needs banks by body number. Banks take no more bits, and the passes lose nothing: at worst all accesses of an issue
-/// go to one bank, which has the ports of the undivided array.
+/// of its ports. If that is too slow, the array needs banks by body number. Banks take no more
+/// bits, and the passes lose nothing: at worst all accesses of an issue go to one bank, which has
+/// the ports of the undivided array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadPorts {
     /// The array.

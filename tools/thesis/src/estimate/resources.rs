@@ -61,8 +61,8 @@ pub struct MemoryUse {
     pub arrays: Vec<ArrayUse>,
     /// Block RAM of the device for these arrays, bytes.
     pub capacity: u64,
-    /// Bytes that the positions of all bodies would take in addition, with one copy for each copy of
-    /// the velocities.
+    /// Bytes that the positions of all bodies would take in addition, with one copy for each copy
+    /// of the velocities.
     pub positions: u64,
 }
 
@@ -189,8 +189,9 @@ mod tests {
         }
     }
 
-    /// By hand: float 38 x 11 + 63 x 15, half 2 x 19 x 11 + 125 x 4, and 19 of shape indices: two collisions an issue read
-    /// and write two rows of impulses, so that the wide shape of one port each way does not do.
+    /// By hand: float 38 x 11 + 63 x 15, half 2 x 19 x 11 + 125 x 4, and 19 of shape indices: two
+    /// collisions an issue read and write two rows of impulses, so that the wide shape of one port
+    /// each way does not do.
     #[test]
     fn shaped_blocks_are_a_little_more_than_the_bits() {
         let blocks = |profile| {

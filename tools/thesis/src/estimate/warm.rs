@@ -11,8 +11,9 @@ use pgs_interface::record::BEAT_BYTES;
 pub enum WarmStart {
     /// In a pass in front of the others of each kind, as the specification says.
     OwnPass,
-    /// In the first pass of each kind, at each collision's own turn. No bitstream does it: a row would
-    /// be solved before its neighbours' impulses are in the velocities, and take its own back.
+    /// In the first pass of each kind, at each collision's own turn. No bitstream does it: a row
+    /// would be solved before its neighbours' impulses are in the velocities, and take its own
+    /// back.
     FirstPass,
 }
 
@@ -109,8 +110,8 @@ mod tests {
         assert_eq!(first.expect("a warm start").more_cycles, 2 * 4 * 127_000);
     }
 
-    /// Two collisions of `half` are eight beats, two of them on 64 bits; one of `mixed` is four, two of them
-    /// on one stream.
+    /// Two collisions of `half` are eight beats, two of them on 64 bits; one of `mixed` is four,
+    /// two of them on one stream.
     #[test]
     fn impulses_in_sixteen_bits_come_in_a_beat_of_each_issue() {
         let of = |profile: &'static Profile, way| {

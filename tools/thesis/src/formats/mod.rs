@@ -13,10 +13,8 @@ use pgs_command::numbers::grouped;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::DeadlineArgs;
-use pgs_command::{pile, step_input};
 use serde_json::json;
-use step_folder::folder::Folder;
-use zynq_pgs::{Body, Collision, Shape, StepParameters};
+use zynq_pgs::StepParameters;
 
 use self::numbers::{AS_STREAMED, Numbers, SUMS};
 pub(crate) use self::numbers::{EACH_ONCE, numbers};
@@ -24,6 +22,7 @@ pub(crate) use self::tally::{Loss, Sizes};
 use crate::experiment::{Boards, Measured, Part, shown};
 use crate::narrow::NarrowFormat;
 use crate::session::Session;
+use crate::study::given::GivenStep;
 use crate::table::{Cell, Table, text};
 
 const EXAMPLES: &str = "\
@@ -57,7 +56,12 @@ pub(crate) struct FormatsArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
     input: Option<PathBuf>,
     /// Step of the scene whose numbers are measured; the steps before it are taken first.
-    #[arg(long, value_name = "N", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 70,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     step: u32,
     #[command(flatten)]
     scene: SceneArgs,
@@ -67,26 +71,15 @@ pub(crate) struct FormatsArgs {
     build: BuildArgs,
 }
 
-/// The input of a step.
-struct Step {
-    bodies: Vec<Body>,
-    shapes: Vec<Shape>,
-    collisions: Vec<Collision>,
-}
-
 /// Measures the numbers.
 fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
     let step = match &args.input {
-        Some(path) => {
-            let Folder { bodies, shapes, collisions, .. } = step_input::load(path)?;
-            Step { bodies, shapes, collisions }
-        }
-        None => match stepped(args, session)? {
-            Some(found) => found,
-            None => return Ok(Part { agrees: true, ..Part::default() }),
-        },
+        Some(path) => Some(GivenStep::folder(path)?),
+        None => stepped(args, session)?,
     };
-    let Step { bodies, shapes, collisions } = step;
+    let Some(GivenStep { bodies, shapes, collisions, .. }) = step else {
+        return Ok(Part::interrupted());
+    };
     let kinds = numbers(&bodies, &shapes, &collisions);
     let mut part = Part::of(vec![of_kinds(&kinds), by_size(&kinds)]);
     match &args.input {
@@ -117,26 +110,16 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
 }
 
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
-fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<Step>, Failure> {
+fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>, Failure> {
     let build = args.build.build();
     let mut opened = board::open_as(&session.common, &build, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;
-    let mut scene = args.scene.build(&build)?;
-    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
+    let scene = args.scene.build(&build)?;
     let parameters = args.deadline.apply(StepParameters::default());
-    session.watch(&mut opened);
     let before = args.step.saturating_sub(1);
-    session.expect(before.into());
-    let taken = pile::step_to(&mut scene, &mut opened, &parameters, before, || {
-        session.advance();
-        !session.is_interrupted()
-    });
+    let step = GivenStep::after(before, scene, &mut opened, parameters, session);
     session.end();
-    Ok(taken?.then(|| Step {
-        bodies: scene.bodies().to_vec(),
-        shapes: scene.shapes().to_vec(),
-        collisions: scene.collisions().to_vec(),
-    }))
+    step
 }
 
 /// The numbers of each kind and of each sum.

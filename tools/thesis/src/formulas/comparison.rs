@@ -57,7 +57,8 @@ fn platforms() -> Table {
         Kind::Recorded.cell(),
     ]);
     table.note(format!(
-        "T6.2 and T6.3 give thermal design powers of {} and {} W for the same GPU and CPU; the 15 W of \
+        "T6.2 and T6.3 give thermal design powers of {} and {} W for the same GPU and CPU; the 15 \
+         W of \
          the board are its maximum, not measured.",
         GPU.design_watts, CPU.design_watts
     ));
@@ -89,6 +90,8 @@ impl Outcome {
     }
 }
 
+use Source::{Latency, Powers};
+
 /// A figure of the thesis' comparison.
 struct Figure {
     /// The thesis' table.
@@ -105,85 +108,89 @@ enum Source {
     Powers(f64),
 }
 
+const fn figure(
+    table: fn(&Design) -> &'static str,
+    name: &'static str,
+    printed: fn(&Design) -> Option<f64>,
+    of: Source,
+) -> Figure {
+    Figure { table, name, printed, of }
+}
+
+/// A figure of its latency table, of its speed-ups, and of its efficiencies.
+const COMPARISON: fn(&Design) -> &'static str = |design| design.comparison;
+const SPEEDUPS: fn(&Design) -> &'static str = |design| design.speedups;
+const EFFICIENCIES: fn(&Design) -> &'static str = |design| design.efficiencies;
+
 const FIGURES: [Figure; 13] = [
-    Figure {
-        table: |design| design.comparison,
-        name: "latency, ms",
-        printed: |design| Some(design.latency_ms),
-        of: Source::Latency(|outcome| outcome.ms),
-    },
-    Figure {
-        table: |design| design.comparison,
-        name: "energy at 15 W, J",
-        printed: |design| Some(design.joules),
-        of: Source::Latency(Outcome::joules),
-    },
-    Figure {
-        table: |design| design.speedups,
-        name: "speed-up over GTX 980",
-        printed: |design| Some(design.speedup.gpu),
-        of: Source::Latency(|outcome| outcome.speedup(&GPU)),
-    },
-    Figure {
-        table: |design| design.speedups,
-        name: "speed-up over i7-3770",
-        printed: |design| Some(design.speedup.cpu),
-        of: Source::Latency(|outcome| outcome.speedup(&CPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency over GTX 980",
-        printed: |design| Some(design.power.gpu),
-        of: Source::Powers(GPU.watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency over i7-3770",
-        printed: |design| Some(design.power.cpu),
-        of: Source::Powers(CPU.watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency over GTX 980",
-        printed: |design| Some(design.energy.gpu),
-        of: Source::Latency(|outcome| outcome.energy(&GPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency over i7-3770",
-        printed: |design| Some(design.energy.cpu),
-        of: Source::Latency(|outcome| outcome.energy(&CPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency, GTX 980 TDP",
-        printed: |_| None,
-        of: Source::Powers(GPU.design_watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "power efficiency, i7-3770 TDP",
-        printed: |_| None,
-        of: Source::Powers(CPU.design_watts / ZCU102_WATTS),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency, GTX 980 TDP",
-        printed: |_| None,
-        of: Source::Latency(|outcome| outcome.energy_at(GPU.design_watts, &GPU)),
-    },
-    Figure {
-        table: |design| design.efficiencies,
-        name: "energy efficiency, i7-3770 TDP",
-        printed: |_| None,
-        of: Source::Latency(|outcome| outcome.energy_at(CPU.design_watts, &CPU)),
-    },
-    Figure {
-        table: |_| "eq 6.5",
-        name: "whole step over GTX 980's",
-        printed: |design| Some(design.whole_step),
-        of: Source::Latency(Outcome::whole_step),
-    },
+    figure(COMPARISON, "latency, ms", |it| Some(it.latency_ms), Latency(|it| it.ms)),
+    figure(COMPARISON, "energy at 15 W, J", |it| Some(it.joules), Latency(Outcome::joules)),
+    figure(
+        SPEEDUPS,
+        "speed-up over GTX 980",
+        |it| Some(it.speedup.gpu),
+        Latency(|it| it.speedup(&GPU)),
+    ),
+    figure(
+        SPEEDUPS,
+        "speed-up over i7-3770",
+        |it| Some(it.speedup.cpu),
+        Latency(|it| it.speedup(&CPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency over GTX 980",
+        |it| Some(it.power.gpu),
+        Powers(GPU.watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency over i7-3770",
+        |it| Some(it.power.cpu),
+        Powers(CPU.watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency over GTX 980",
+        |it| Some(it.energy.gpu),
+        Latency(|it| it.energy(&GPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency over i7-3770",
+        |it| Some(it.energy.cpu),
+        Latency(|it| it.energy(&CPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency, GTX 980 TDP",
+        |_| None,
+        Powers(GPU.design_watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "power efficiency, i7-3770 TDP",
+        |_| None,
+        Powers(CPU.design_watts / ZCU102_WATTS),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency, GTX 980 TDP",
+        |_| None,
+        Latency(|it| it.energy_at(GPU.design_watts, &GPU)),
+    ),
+    figure(
+        EFFICIENCIES,
+        "energy efficiency, i7-3770 TDP",
+        |_| None,
+        Latency(|it| it.energy_at(CPU.design_watts, &CPU)),
+    ),
+    figure(
+        |_| "eq 6.5",
+        "whole step over GTX 980's",
+        |it| Some(it.whole_step),
+        Latency(Outcome::whole_step),
+    ),
 ];
 
 fn against(scene: &Scene) -> Table {
@@ -210,9 +217,10 @@ fn against(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "Recomputed: from the thesis' own cycles, clock and powers, unrounded. Ours: packed records \
-         without a wait for memory, as the thesis counts; then records as streamed, at unlimited, 17.07 and \
-         12.8 GB/s. Time and power of GPU and CPU, the board's 15 W and the share of 60 % in equation \
+        "Recomputed: from the thesis' own cycles, clock and powers, unrounded. Ours: packed \
+         records without a wait for memory, as the thesis counts; then records as streamed, at \
+         unlimited, 17.07 and 12.8 GB/s. Time and power of GPU and CPU, the board's 15 W and the \
+         share of 60 % in equation \
          6.5 are the thesis'; no figure was measured here.",
     );
     table.note(format!(
@@ -221,9 +229,10 @@ fn against(scene: &Scene) -> Table {
         GPU.design_watts, CPU.design_watts, GPU.watts, CPU.watts
     ));
     table.note(
-        "The thesis divides energies that it has rounded to two digits; 133 W over 15 W is 8.87, not \
-         8.67. Its Figures 6.1 and 6.2 chart its first design, naive, and its text prints no numbers of \
-         it. Ours is a lower bound of it: the thesis converts contacts in a kernel of its own, whose rows go \
+        "The thesis divides energies that it has rounded to two digits; 133 W over 15 W is 8.87, \
+         not 8.67. Its Figures 6.1 and 6.2 chart its first design, naive, and its text prints no \
+         numbers of it. Ours is a lower bound of it: the thesis converts contacts in a kernel of \
+         its own, whose rows go \
          through memory, ours within the passes.",
     );
     table
@@ -268,8 +277,8 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
         text(variant.profile.name),
         text(design.map_or("-", figure.table)),
         text(figure.name),
-        printed.map_or(Cell::Missing, number),
-        recomputed.map_or(Cell::Missing, number),
+        Cell::known(printed, number),
+        Cell::known(recomputed, number),
         packed,
         off,
         unlimited,
@@ -281,11 +290,12 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
 
 /// Figures 6.1 and 6.2: speed-up and energy efficiency of each design over the thesis' GPU and CPU.
 pub(super) fn figures(part: &mut Part) {
-    let caption = "Times of GTX 980 and i7-3770 are the thesis' records; the accelerator's are our model's, on \
-         the thesis' step. The thesis' figure has bars of its first design, and its text prints no numbers \
-         of it. Our naive converts contacts within the passes, the thesis in a kernel of its own whose \
-         rows go through memory: ours is a lower bound of its first design. mixed, windowed and \
-         windowed16 are this project's own, and no boards: no hardware has them, and no processor \
+    let caption = "Times of GTX 980 and i7-3770 are the thesis' records; the accelerator's are our \
+        model's, on the thesis' step. The thesis' figure has bars of its first design, and its \
+        text prints no numbers of it. Our naive converts contacts within the passes, the thesis in \
+        a kernel of its own whose rows go through memory: ours is a lower bound of its first \
+        design. mixed, windowed and windowed16 are this project's own, and no boards: no hardware \
+        has them, and no processor \
          of this class can order collisions for the last two.";
     let (figure, row) = over_both(
         ("figure-6-1", "§6.5, Figure 6.1"),
@@ -294,8 +304,10 @@ pub(super) fn figures(part: &mut Part) {
         Outcome::speedup,
     );
     part.figure(figure, [row]);
-    let caption = "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and not measured. \
-         The table of the comparison has the thermal design powers of its Tables 6.2 and 6.3 beside them.";
+    let caption = "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and \
+        not measured. The table of the comparison has the thermal design powers of its Tables 6.2 \
+        and 6.3 \
+         beside them.";
     let (figure, row) = over_both(
         ("figure-6-2", "§6.5, Figure 6.2"),
         ["energy efficiency", "Energy efficiency of each design over GPU and CPU", caption],
@@ -305,7 +317,8 @@ pub(super) fn figures(part: &mut Part) {
     part.figure(figure, [row]);
 }
 
-/// A chart of a figure over GPU and CPU, as printed and as ours, and its row: both designs of the thesis.
+/// A chart of a figure over GPU and CPU, as printed and as ours, and its row: both designs of the
+/// thesis.
 fn over_both(
     id: (&'static str, &'static str),
     [what, title, caption]: [&str; 3],

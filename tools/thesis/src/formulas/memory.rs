@@ -23,10 +23,9 @@ fn footprint(scene: &Scene) -> Table {
     for (variant, memory) in uses(scene) {
         let design = Design::of(variant.profile);
         let beside = |bytes: u64, theirs: fn(&Design) -> f64| {
-            let thesis = design.map_or(Cell::Missing, |design| Cell::Number(theirs(design), 2));
-            let off = design.map_or(Cell::Missing, |design| {
-                scene.difference(printed_mib(bytes), theirs(design))
-            });
+            let thesis = Cell::known(design, |design| Cell::Number(theirs(design), 2));
+            let off =
+                Cell::known(design, |design| scene.difference(printed_mib(bytes), theirs(design)));
             [Cell::Number(mib(bytes), 2), thesis, off]
         };
         let [ours, thesis, off] = beside(memory.block_ram(), |design| design.mebibytes);
@@ -50,7 +49,8 @@ fn footprint(scene: &Scene) -> Table {
         ]);
     }
     table.note(
-        "Differences are of the two digits that the thesis prints. Positions would be kept in as many \
+        "Differences are of the two digits that the thesis prints. Positions would be kept in as \
+         many \
          copies as the velocities; no profile keeps them.",
     );
     table
@@ -76,9 +76,10 @@ fn arrays(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "Row: bytes. A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the fewest blocks of one \
-         shape side by side and one after the other; 1024 x 18 and narrower have two ports that read \
-         and write, 512 x 36 one to read and one to write (UG573). The thesis has one shape of body \
+        "Row: bytes. A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the \
+         fewest blocks of one shape side by side and one after the other; 1024 x 18 and narrower \
+         have two ports that read and write, 512 x 36 one to read and one to write (UG573). The \
+         thesis has one shape of body \
          and no shape indices.",
     );
     table
@@ -90,9 +91,8 @@ fn blocks(scene: &Scene) -> Table {
     let share = |blocks: u64| Cell::Share(percent(blocks));
     for (variant, memory) in uses(scene) {
         let thesis = Design::of(variant.profile).map(|design| f64::from(design.block_ram));
-        let off = |blocks: u64| {
-            thesis.map_or(Cell::Missing, |thesis| scene.difference(percent(blocks), thesis))
-        };
+        let off =
+            |blocks: u64| Cell::known(thesis, |thesis| scene.difference(percent(blocks), thesis));
         let (ideal, shaped) = (memory.ideal_blocks(), memory.shaped_blocks());
         table.row([
             ("profile", "profile", text(variant.profile.name)),
@@ -100,7 +100,7 @@ fn blocks(scene: &Scene) -> Table {
             ("ideal_percent", "share", share(ideal)),
             ("shaped_blocks", "by shape", Cell::Whole(shaped)),
             ("shaped_percent", "share", share(shaped)),
-            ("thesis_percent", "thesis", thesis.map_or(Cell::Missing, Cell::Share)),
+            ("thesis_percent", "thesis", Cell::known(thesis, Cell::Share)),
             ("ideal_difference_percent", "by bits off", off(ideal)),
             ("shaped_difference_percent", "by shape off", off(shaped)),
             ("shaped_fit", "fits by shape", text(yes_or_no(shaped <= BLOCKS))),
@@ -173,7 +173,8 @@ pub(super) fn streams(scene: &Scene) -> Vec<Table> {
         ]);
     }
     table.note(format!(
-        "Each stream takes one of the {HP_PORTS} high-performance ports of 128 bits (UG1085). HP1 and \
+        "Each stream takes one of the {HP_PORTS} high-performance ports of 128 bits (UG1085). HP1 \
+         and \
          HP2 share a port of the memory controller. Above 100 % a pass waits for the memory.",
     ));
     vec![table]

@@ -49,7 +49,8 @@ fn against_float(scene: &Scene, mixed: &Variant) -> Table {
     table.note(format!("Bytes: {} half of float's.", if half { "at most" } else { "more than" }));
     let account = PortAccount::new(mixed);
     table.note(format!(
-        "Initiation interval {}: the ports of the on-chip arrays allow {}, the beats of a record on its \
+        "Initiation interval {}: the ports of the on-chip arrays allow {}, the beats of a record \
+         on its \
          streams {}; {}.",
         account.claimed,
         account.by_ports(),

@@ -7,9 +7,10 @@ use super::scene::{Scene, yes_or_no};
 use crate::table::{Cell, Kind, Table, text};
 
 /// The pump's demands on the device, and what is known of them.
-pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 MHz), is \
-    a design assumption and was not synthesised. A global clock tree may run at 775 MHz (DS925 1.29, \
-    clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in DS925 was not \
+pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 \
+    MHz), is a design assumption and was not synthesised. A global clock tree may run at 775 MHz \
+    (DS925 1.29, clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in \
+    DS925 was not \
     verified.";
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
@@ -36,7 +37,8 @@ fn arrays(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "A copy has two ports; each takes one row a clock, twice that many with a pump of 2. A read \
+        "A copy has two ports; each takes one row a clock, twice that many with a pump of 2. A \
+         read \
          goes to one copy, a write to all: cycles = ceil(busiest copy / (2 x pump)).",
     );
     table
@@ -111,7 +113,8 @@ fn schedule(scene: &Scene) -> Table {
     }
     table.note(
         "Clock counts the block RAM's clocks within a cycle. Writes belong to an issue that \
-         entered the pipeline earlier. Take: the last use of a body in the pass before, written into \
+         entered the pipeline earlier. Take: the last use of a body in the pass before, written \
+         into \
          the memory of the next unit; at most two happen at once.",
     );
     table
@@ -144,8 +147,8 @@ fn alternatives(scene: &Scene) -> Table {
     );
     table.note(PUMP);
     table.note(
-        "Considered instead: banks by body colour, one read and one write a cycle each, without copy \
-         or pump. The order of the collisions must then keep the two bodies of a collision in \
+        "Considered instead: banks by body colour, one read and one write a cycle each, without \
+         copy or pump. The order of the collisions must then keep the two bodies of a collision in \
          different banks.",
     );
     table
@@ -166,7 +169,8 @@ fn load(scene: &Scene) -> Table {
         }
     }
     table.note(
-        "The cycle formula takes the streams. Where the ports of one bank are slower the bodies need \
+        "The cycle formula takes the streams. Where the ports of one bank are slower the bodies \
+         need \
          banks by number: no more bits, by shape a few blocks more, and the passes lose nothing.",
     );
     table

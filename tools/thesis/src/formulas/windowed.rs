@@ -56,9 +56,10 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
         ));
     }
     table.note(
-        "Slot: cycles in which every pass issues one entry. Load and integration run in parallel to the \
-         passes; bodies without a collision follow, two cycles each, and the fill of the integration at the end. In the formula the passes take \
-         turns. The emulated board has a scoreboard, which usually needs fewer cycles: a unit takes up \
+        "Slot: cycles in which every pass issues one entry. Load and integration run in parallel \
+         to the passes; bodies without a collision follow, two cycles each, and the fill of the \
+         integration at the end. In the formula the passes take turns. The emulated board has a \
+         scoreboard, which usually needs fewer cycles: a unit takes up \
          another pass when one has to wait.",
     );
     table
@@ -118,8 +119,9 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
         let left = 100_u32.saturating_sub(logic.lookup_tables);
         table.note(if logic.fits() {
             format!(
-                "{}: {left} % of the lookup tables are left for places, scoreboard, delay lines and \
-                 DMAs, which this table does not count. Only a synthesis can tell whether that is \
+                "{}: {left} % of the lookup tables are left for places, scoreboard, delay lines \
+                 and DMAs, which this table does not count. Only a synthesis can tell whether that \
+                 is \
                  enough, and whether it closes timing.",
                 variant.profile.name
             )
@@ -128,7 +130,8 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
         });
     }
     table.note(
-        "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one unit of \
+        "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one \
+         unit of \
          each kind, and its logic is multiplied by the number of units.",
     );
     table

@@ -64,7 +64,8 @@ pub(super) fn add(
         "Bodies to keep on chip along the sorted collisions",
         lines(Axis::linear("issue slot"), Axis::log("bodies alive"), &series),
         format!(
-            "A body is alive from its first collision to its last. The step is {step}; the thesis' own is \
+            "A body is alive from its first collision to its last. The step is {step}; the thesis' \
+             own is \
              not published, and its Algorithm 3 does not say how ties are broken.",
         ),
     );

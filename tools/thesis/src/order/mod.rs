@@ -48,7 +48,11 @@ pub(crate) static ORDER: Measured<OrderArgs> = Measured {
 #[command(after_help = EXAMPLES)]
 pub(crate) struct OrderArgs {
     /// Collisions of a folder of .npy arrays.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["grid", "steps", "drop", "spheres", "seed"])]
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["grid", "steps", "drop", "spheres", "seed"]
+    )]
     input: Option<PathBuf>,
     /// Collisions of an irregular pile with this many spheres of three sizes.
     #[arg(long, value_name = "N", conflicts_with_all = ["grid", "steps", "drop"])]
@@ -75,10 +79,20 @@ pub(crate) struct OrderArgs {
     )]
     depth: Vec<u32>,
     /// Collisions that enter the pipeline in one issue slot.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::PER_ISSUE_MAX)))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(IssueWindow::PER_ISSUE_MAX))
+    )]
     per_issue: u32,
     /// Runs for the median host time.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 9,
+        value_parser = clap::value_parser!(u32).range(1..=1000)
+    )]
     runs: u32,
 }
 

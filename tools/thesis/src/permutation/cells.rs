@@ -1,10 +1,11 @@
 //! Orders collisions as Bullet's GPU solver does: by groups of cells that can be solved at the same
 //! time, by cell, and in a cell by batches of pairs without a common body.
 //!
-//! Bullet's own `gpu_order.npy` of the thesis' scene has 256 cells. This order has the same cells in the
-//! same sequence; 223 cells also have the same sequence of collisions.
+//! Bullet's own `gpu_order.npy` of the thesis' scene has 256 cells. This order has the same cells
+//! in the same sequence; 223 cells also have the same sequence of collisions.
 //!
-//! Source: `Bullet3OpenCL`, `b3GpuPgsContactSolver`, `SetSortDataKernel` and `sortConstraintByBatch3`.
+//! Source: `Bullet3OpenCL`, `b3GpuPgsContactSolver`, `SetSortDataKernel` and
+//! `sortConstraintByBatch3`.
 
 use zynq_pgs::order::OrderInput;
 
@@ -34,8 +35,8 @@ pub(crate) fn order(input: &OrderInput<'_>) -> Vec<u32> {
     order
 }
 
-/// The place of a pair's cell in the sequence: first the parities of its coordinates, z before y before
-/// x, then the halves of the coordinates likewise.
+/// The place of a pair's cell in the sequence: first the parities of its coordinates, z before y
+/// before x, then the halves of the coordinates likewise.
 fn key(input: &OrderInput<'_>, [a, b]: [u32; 2]) -> u32 {
     let body = if is_moving(input, a) { a } else { b };
     let body = usize::try_from(body).ok();
@@ -59,9 +60,9 @@ fn is_moving(input: &OrderInput<'_>, body: u32) -> bool {
     body.and_then(|body| input.moving.get(body)).is_some_and(|moving| *moving)
 }
 
-/// Brings the collisions of a cell into batches: each round takes the pairs whose bodies are free, and
-/// swaps them to the front; the first pair is always free. `taken` has the number of the batch that used
-/// each body last.
+/// Brings the collisions of a cell into batches: each round takes the pairs whose bodies are free,
+/// and swaps them to the front; the first pair is always free. `taken` has the number of the batch
+/// that used each body last.
 fn batches(input: &OrderInput<'_>, cell: &mut [u32], taken: &mut [u32], batch: &mut u32) {
     let mut done = 0;
     while done < cell.len() {
@@ -139,7 +140,8 @@ mod tests {
         let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -6.0]];
         let pairs = [[0, 0], [1, 1], [2, 2], [3, 3]];
         let found = order(&input(&pairs, &[true; 4], &positions));
-        // Along x cell 0, cell 2, and then cell 1; along z cell 0 before cell 7, which is -1 folded.
+        // Along x cell 0, cell 2, and then cell 1; along z cell 0 before cell 7, which is -1
+        // folded.
         assert_eq!(found, [0, 2, 1, 3]);
     }
 

@@ -102,8 +102,8 @@ impl Arranger {
         Self { source, buffers: InputBuffers::new(), arranged: Vec::new() }
     }
 
-    /// The collisions of the next step in their order. Where one of them has a body that does not exist
-    /// they stay as given, so that the board's refusal names the place of this one.
+    /// The collisions of the next step in their order. Where one of them has a body that does not
+    /// exist they stay as given, so that the board's refusal names the place of this one.
     pub(crate) fn arrange<'a>(
         &'a mut self,
         bodies: &[Body],
@@ -228,7 +228,8 @@ mod tests {
         assert_eq!(sorted, collisions);
     }
 
-    /// Orders of one step: each collision once, and the bodies' own order where a body does not exist.
+    /// Orders of one step: each collision once, and the bodies' own order where a body does not
+    /// exist.
     #[test]
     fn every_order_has_each_collision_once() {
         let contacts = [Contact { point: [0.0; 3], distance: 0.0 }; CONTACT_POINTS];

@@ -35,12 +35,18 @@ pub(crate) struct AllArgs {
     #[arg(long, value_name = "NXxNYxNZ", requires = "all")]
     grid: Option<Grid>,
     /// Step of our own pile that is measured; the steps before it are taken first.
-    #[arg(long, value_name = "N", requires = "all", default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "all",
+        default_value_t = 70,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     step: u32,
 }
 
 impl AllArgs {
-    /// Whether the request is for all experiments.
+    /// Whether all experiments run.
     pub(crate) const fn is_asked(&self) -> bool {
         self.all
     }

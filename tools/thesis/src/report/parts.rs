@@ -11,7 +11,7 @@ use super::AllArgs;
 use crate::command::experiments;
 use crate::experiment::{Part, shown};
 use crate::session::Session;
-use pgs_command::common::CommonArgs;
+use pgs_command::common::{BoardName, CommonArgs};
 use pgs_command::failure::{Cause, Failure};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::scenes::DROP;
@@ -44,7 +44,8 @@ pub(super) fn gather(
         bar.set_style(style);
     }
     bar.enable_steady_tick(TICK);
-    let session = Session::within(common, interrupt.clone(), bar.clone());
+    let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
+    let session = Session::within(&common, interrupt.clone(), bar.clone());
     let gathered = of_all(args, &session, &bar);
     bar.finish_and_clear();
     gathered
@@ -54,11 +55,10 @@ fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report
     let mut part = Part::default();
     for (id, words) in args.runs() {
         bar.set_message(id);
-        let (command, one) = run(id, &words, session)?;
+        let (command, mut one) = run(id, &words, session)?;
         if session.is_interrupted() || !one.complete {
             return Err(Failure::new(Cause::Output, "interrupted: no page was written"));
         }
-        let mut one = one;
         one.printed_by(&command);
         // The page has the tables of the formulas; the others stand in its figures.
         if !FORMULAS.contains(&id) {
@@ -169,7 +169,7 @@ impl AllArgs {
     }
 }
 
-/// The height from which a pile falls for many steps, m: the collisions come one behind the other.
+/// The height from which the piles of many steps fall, m.
 const LONG_DROP: u32 = 5;
 
 fn words(text: &str) -> Vec<String> {
@@ -202,8 +202,9 @@ mod tests {
         gather(&options(), &common, &Interrupt::install()).expect("a report")
     });
 
-    /// `tests/golden/report.json` has every cell of the tables, and every row of the index that is not
-    /// measured and needs no step of a pile, as recorded before the experiments had a crate of their own.
+    /// `tests/golden/report.json` has every cell of the tables, and every row of the index that is
+    /// not measured and needs no step of a pile, as recorded before the experiments had a crate of
+    /// their own.
     #[test]
     fn modelled_and_counted_figures_are_the_recorded_ones() {
         let golden: Value =
@@ -286,7 +287,8 @@ mod tests {
         serde_json::from_slice(&out).expect("a document")
     }
 
-    /// The rows of a report on steps that are found in the same report again, by the command of each.
+    /// The rows of a report on steps that are found in the same report again, by the command of
+    /// each.
     #[test]
     fn rows_of_formats_and_orders_have_the_figures_that_their_commands_print() {
         let percent = |value: &Value| value.as_f64().expect("a number");

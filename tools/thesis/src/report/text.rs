@@ -11,7 +11,7 @@ use crate::index::WITHOUT_COUNTERPART;
 use crate::index::{Origin, Row};
 use crate::table::Table;
 
-/// The sources of the report.
+/// The source of the page's figures.
 pub(super) fn preface(report: &Report) -> String {
     let step = match report.given {
         true => format!("Measured on {}.", report.step),

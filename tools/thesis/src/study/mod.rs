@@ -1,11 +1,12 @@
 //! Experiments that step a board, and measure again a claim of the thesis.
 
 pub(crate) mod determinism;
+pub(crate) mod given;
 pub(crate) mod half;
 pub(crate) mod ladder;
 pub(crate) mod pile;
 pub(crate) mod recorded;
-mod run;
+pub(crate) mod run;
 pub(crate) mod split;
 mod spread;
 pub(crate) mod stages;

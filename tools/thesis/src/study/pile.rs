@@ -59,7 +59,7 @@ fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
     session.expect(steps.into());
     for step in 1..=steps {
         if session.is_interrupted() {
-            return Ok(Part { agrees: true, ..Part::default() });
+            return Ok(Part::interrupted());
         }
         most = most.max(scene.detect().len());
         let (bodies, collisions) = scene.parts_mut();

@@ -85,8 +85,8 @@ pub(crate) const INPUT: RecordedInput = RecordedInput {
     under_1_percent_share: 0.9993,
 };
 
-/// Bits of exponent and mantissa of sixteen bits, in IEEE 754 and in the thesis' own form (Figures 4.4
-/// and 4.11).
+/// Bits of exponent and mantissa of sixteen bits, in IEEE 754 and in the thesis' own form (Figures
+/// 4.4 and 4.11).
 pub(crate) const SIXTEEN_BITS: [u32; 2] = [5, 10];
 /// Smallest and largest magnitude of its own form (§4.6.4).
 pub(crate) const SIXTEEN_BITS_RANGE: [f64; 2] = [6.10352e-5, 512.0];

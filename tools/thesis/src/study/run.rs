@@ -1,7 +1,7 @@
 //! Steps one run of a study: its bodies, and the order of its collisions.
 
 use scene::{Scene, kinetic_energy};
-use zynq_pgs::{Body, Collision, Shape, StepParameters};
+use zynq_pgs::{Body, Collision, Shape, StepParameters, StepReport};
 
 use super::start::Start;
 use crate::permutation::{Arranger, Permutation};
@@ -12,23 +12,47 @@ use step_folder::folder::Folder;
 
 /// The bodies and collisions of a run.
 #[derive(Debug)]
-pub(super) enum World<'a> {
-    /// A scene, whose collisions are detected before each step.
+pub(crate) enum World<'a> {
+    /// A scene, whose collisions are detected.
     Scene(Box<Scene>),
-    /// One step from a folder.
+    /// One step from a folder, without the shapes' geometry.
     Folder { folder: &'a Folder, bodies: Vec<Body> },
+}
+
+impl World<'_> {
+    pub(crate) fn bodies(&self) -> &[Body] {
+        match self {
+            Self::Scene(scene) => scene.bodies(),
+            Self::Folder { bodies, .. } => bodies,
+        }
+    }
+
+    pub(crate) fn shapes(&self) -> &[Shape] {
+        match self {
+            Self::Scene(scene) => scene.shapes(),
+            Self::Folder { folder, .. } => &folder.shapes,
+        }
+    }
+
+    /// The collisions of the next step; a folder's are the same at any time.
+    pub(crate) fn collisions(&mut self) -> Vec<Collision> {
+        match self {
+            Self::Scene(scene) => scene.detect().to_vec(),
+            Self::Folder { folder, .. } => folder.collisions.clone(),
+        }
+    }
 }
 
 /// A run.
 #[derive(Debug)]
-pub(super) struct Run<'a> {
-    world: World<'a>,
+pub(crate) struct Run<'a> {
+    pub(crate) world: World<'a>,
     /// None if the collisions stay as given.
     arranger: Option<Arranger>,
 }
 
 impl<'a> Run<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         world: World<'a>,
         permutation: Option<Permutation>,
         recorded: Option<Vec<u32>>,
@@ -36,7 +60,26 @@ impl<'a> Run<'a> {
         Self { world, arranger: permutation.map(|order| Arranger::new(order, recorded)) }
     }
 
-    /// Takes a step; false if Ctrl-C ended it.
+    /// Takes a step with the collisions that were detected last.
+    pub(crate) fn take(
+        &mut self,
+        opened: &mut OpenBoard,
+        parameters: &StepParameters,
+    ) -> Result<StepReport, zynq_pgs::Error> {
+        let Self { world, arranger } = self;
+        let shapes = if arranger.is_some() { world.shapes().to_vec() } else { Vec::new() };
+        let (bodies, collisions) = match world {
+            World::Scene(scene) => scene.parts_mut(),
+            World::Folder { folder, bodies } => (&mut bodies[..], &folder.collisions[..]),
+        };
+        let collisions = match arranger {
+            Some(arranger) => arranger.arrange(bodies, &shapes, collisions),
+            None => collisions,
+        };
+        opened.accelerator.step(bodies, collisions, parameters)
+    }
+
+    /// Detects the collisions and takes a step; false if Ctrl-C ended it.
     pub(super) fn step(
         &mut self,
         opened: &mut OpenBoard,
@@ -47,20 +90,10 @@ impl<'a> Run<'a> {
         if session.is_interrupted() {
             return Ok(false);
         }
-        let shapes = start.shapes();
-        let stepped = match &mut self.world {
-            World::Scene(scene) => {
-                scene.detect();
-                let (bodies, collisions) = scene.parts_mut();
-                let collisions = arranged(&mut self.arranger, bodies, shapes, collisions);
-                opened.accelerator.step(bodies, collisions, parameters)
-            }
-            World::Folder { folder, bodies } => {
-                let collisions = arranged(&mut self.arranger, bodies, shapes, &folder.collisions);
-                opened.accelerator.step(bodies, collisions, parameters)
-            }
-        };
-        match stepped {
+        if let World::Scene(scene) = &mut self.world {
+            scene.detect();
+        }
+        match self.take(opened, parameters) {
             Ok(_) => {
                 opened.alive()?;
                 session.advance();
@@ -95,34 +128,11 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn bodies(&self) -> &[Body] {
-        match &self.world {
-            World::Scene(scene) => scene.bodies(),
-            World::Folder { bodies, .. } => bodies,
-        }
-    }
-
-    /// The collisions of the next step; a folder's are the same at any time.
-    pub(super) fn collisions(&mut self) -> Vec<Collision> {
-        match &mut self.world {
-            World::Scene(scene) => scene.detect().to_vec(),
-            World::Folder { folder, .. } => folder.collisions.clone(),
-        }
+        self.world.bodies()
     }
 
     /// J.
     pub(super) fn kinetic_energy(&self, start: &Start<'_>) -> f64 {
         kinetic_energy(self.bodies(), start.shapes())
-    }
-}
-
-fn arranged<'c>(
-    arranger: &'c mut Option<Arranger>,
-    bodies: &[Body],
-    shapes: &[Shape],
-    collisions: &'c [Collision],
-) -> &'c [Collision] {
-    match arranger {
-        Some(arranger) => arranger.arrange(bodies, shapes, collisions),
-        None => collisions,
     }
 }

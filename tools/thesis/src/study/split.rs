@@ -1,9 +1,10 @@
-//! The study `split`: the shares of collision search and collision response in a step (thesis §4.4: 40
-//! and 60 %), and the gain of the whole step when the response alone becomes faster (equation 6.5).
+//! The study `split`: the shares of collision search and collision response in a step (thesis §4.4:
+//! 40 and 60 %), and the gain of the whole step when the response alone becomes faster (equation
+//! 6.5).
 //!
-//! Both shares are measured on this host, in processor time of one thread: the search is the detection
-//! of `pgs run`, the response is the yardstick, a sequential solver with Bullet's bits. The time of the
-//! board is modelled.
+//! Both shares are measured on this host, in processor time of one thread: the search is the
+//! detection of `pgs run`, the response is the yardstick, a sequential solver with Bullet's bits.
+//! The time of the board is modelled.
 
 use std::time::Duration;
 
@@ -33,8 +34,10 @@ Examples:
   pgs thesis split --grid 12x12x12 --steps 90 --runs 15 --json
 
 Measured: medians over successive steps of a pile, in processor time of one thread, which a busy
-host changes less than time by the clock. Search is the detection of this project (a grid, then cubes
-against cubes), response the yardstick: a sequential scalar solver with Bullet's bits, that makes its
+host changes less than time by the clock. Search is the detection of this project (a grid, then \
+cubes
+against cubes), response the yardstick: a sequential scalar solver with Bullet's bits, that makes \
+its
 rows, takes the passes and integrates, in memory that an unmeasured run has touched. Driver: time by
 the clock around the board's, for checks, order, packing and results. Modelled: the board's time, at
 the bandwidth that a ZCU102 sustains.
@@ -46,7 +49,8 @@ share: the thesis' 0.6, or the measured one.";
 pub(crate) static SPLIT: Measured<Options> = Measured {
     id: "split",
     thesis: "§4.4, equation 6.5",
-    about: "The shares of collision search and response in a step, and what a faster response gains",
+    about: "The shares of collision search and response in a step, and what a faster response \
+        gains",
     boards: Boards::Any,
     run: |options, session| Ok(measure(options, session)?.part()),
 };
@@ -65,7 +69,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 45)]
     pub(crate) steps: u32,
     /// Measured steps.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 9,
+        value_parser = clap::value_parser!(u32).range(1..=1000)
+    )]
     pub(crate) runs: u32,
 }
 
@@ -259,7 +268,8 @@ impl Outcome {
         let Self { grid, drop_m, bodies, collisions, samples, .. } = self;
         let (bodies, collisions) = (grouped(*bodies as u64), grouped(*collisions as u64));
         let pile = format!(
-            "{grid} cubes dropped from {drop_m} m: {bodies} bodies, {collisions} collisions, median of \
+            "{grid} cubes dropped from {drop_m} m: {bodies} bodies, {collisions} collisions, \
+             median of \
              {} steps, one thread",
             samples.len()
         );
@@ -269,7 +279,8 @@ impl Outcome {
         part.fact("pile", pile);
         if let Some((times, [least, most])) = self.median.as_ref().zip(self.response_share_range) {
             let text = format!(
-                "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); thesis \
+                "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); \
+                 thesis \
                  {:.0} % (recorded)",
                 100.0 * times.response_share(),
                 100.0 * least,
@@ -297,7 +308,8 @@ impl Outcome {
                 &[0, 1].map(|part| vec![Some(recorded[part]), Some(ours[part])]),
             ),
             format!(
-                "a pile of {} cubes, in processor time of one thread of this host. The thesis names \
+                "a pile of {} cubes, in processor time of one thread of this host. The thesis \
+                 names \
                  neither its processor nor its program for the shares.",
                 self.grid
             ),

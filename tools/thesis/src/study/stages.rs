@@ -80,7 +80,8 @@ fn measure(common: &CommonArgs) -> Result<Part, Failure> {
             &FLOAT,
             ("figure-5-2", "§5.1.1, Figure 5.2"),
             "The same step with a pipeline, on four channels (profile float)",
-            "Four streams of 128 bits: a collision enters every two cycles unless it must wait for a body.",
+            "Four streams of 128 bits: a collision enters every two cycles unless it must wait \
+             for a body.",
         ),
     ] {
         let (svg, cycles) = timeline(profile, common)?;
@@ -93,7 +94,8 @@ fn measure(common: &CommonArgs) -> Result<Part, Failure> {
         let StepParameters { contact_iterations, friction_iterations, .. } =
             StepParameters::default();
         row.command = format!(
-            "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations {contact_iterations} \
+            "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations \
+             {contact_iterations} \
              --friction-iterations {friction_iterations} --profile {} --json --timeline step.svg",
             STEPS + 1,
             profile.name

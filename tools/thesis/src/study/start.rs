@@ -95,7 +95,7 @@ impl<'a> Start<'a> {
 
     /// The numbers that the next step of a run gives the board, each once.
     pub(super) fn numbers(&self, run: &mut Run<'_>) -> Vec<f32> {
-        let collisions = run.collisions();
+        let collisions = run.world.collisions();
         let kinds = numbers(run.bodies(), &self.shapes, &collisions);
         EACH_ONCE.of(&kinds).copied().collect()
     }

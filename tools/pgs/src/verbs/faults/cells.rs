@@ -138,9 +138,9 @@ fn site_of(kind: FaultKind) -> Site {
     }
 }
 
-/// The cells that a simulator of the hardware tries: faults of the streams that the hardware can see, in
-/// the middle of each packet, and one error of a DMA, which resets it in the middle of a packet. All
-/// others happen outside of it, and each takes a simulator seconds.
+/// The cells that a simulator of the hardware tries: faults of the streams that the hardware can
+/// see, in the middle of each packet, and one error of a DMA, which resets it in the middle of a
+/// packet. All others happen outside of it, and each takes a simulator seconds.
 pub(super) fn for_simulator(bench: &Bench) -> Vec<Cell> {
     use FaultKind as K;
     let (cells, _) = of(bench);

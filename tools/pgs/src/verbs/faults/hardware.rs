@@ -13,18 +13,8 @@ use super::{FaultsArgs, list, try_all};
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Failure, Verdict};
-use pgs_command::numbers::grouped;
 use pgs_command::output::SCHEMA;
-use pgs_command::output::table::{Column, heading, line};
-
-const COLUMNS: [Column; 6] = [
-    Column { name: "fault", unit: "", width: 14 },
-    Column { name: "on", unit: "", width: 5 },
-    Column { name: "tried", unit: "cells", width: 6 },
-    Column { name: "model's diagnosis", unit: "", width: 26 },
-    Column { name: "hardware's", unit: "", width: 26 },
-    Column { name: "equal", unit: "cells", width: 6 },
-];
+use pgs_command::output::table::{Cell as Shown, Table, text};
 
 /// A cell, and its results on the model and on the hardware.
 struct Pair {
@@ -94,7 +84,7 @@ pub(super) fn run(
 }
 
 fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<(), Failure> {
-    heading(out, &COLUMNS)?;
+    let mut table = Table::new("pairs", "Kinds of faults on the model and on the hardware");
     let mut rows: Vec<[&str; 4]> = Vec::new();
     for pair in pairs {
         if !rows.contains(&pair.row()) {
@@ -103,11 +93,19 @@ fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<(), Failure> {
     }
     for row in rows {
         let of_row = || pairs.iter().filter(|pair| pair.row() == row);
-        let [kind, way, model, hardware] = row.map(str::to_owned);
+        let [kind, way, model, hardware] = row.map(text);
         let equal = of_row().filter(|pair| pair.equal()).count();
-        let [tried, equal] = [of_row().count(), equal].map(|count| grouped(count as u64));
-        line(out, &COLUMNS, [kind, way, tried, model, hardware, equal])?;
+        let [tried, equal] = [of_row().count(), equal].map(|count| Shown::Whole(count as u64));
+        table.row([
+            ("fault", "fault", kind),
+            ("on", "on", way),
+            ("tried", "tried\ncells", tried),
+            ("model", "model's diagnosis", model),
+            ("hardware", "hardware's", hardware),
+            ("equal", "equal\ncells", equal),
+        ]);
     }
+    write!(out, "{}", table.to_text(usize::MAX))?;
     for pair in pairs.iter().filter(|pair| !pair.equal()) {
         writeln!(
             out,

@@ -37,7 +37,8 @@ Examples:
 Examples with the Verilog in simulation (docs/bitstream.md):
   pgs faults --accelerator rtl:rtl-sim/pgs-rtl     stream faults, on the generated hardware too
 
-Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go out.
+Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go \
+out.
 A cell is one fault at one place. It passes if the fault happened, and
 
   a fatal fault    was named correctly, with its channel, before the deadline, and changed no body

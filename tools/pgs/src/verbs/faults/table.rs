@@ -9,19 +9,7 @@ use super::cells::Cell;
 use super::expected::Expected;
 use super::trial::CellResult;
 use pgs_command::numbers::grouped;
-use pgs_command::output::table::{Column, heading, line};
-
-const COLUMNS: [Column; 9] = [
-    Column { name: "fault", unit: "", width: 18 },
-    Column { name: "must", unit: "", width: 8 },
-    Column { name: "tried", unit: "cells", width: 6 },
-    Column { name: "happened", unit: "", width: 8 },
-    Column { name: "cause", unit: "named", width: 6 },
-    Column { name: "bodies", unit: "right", width: 6 },
-    Column { name: "in time", unit: "", width: 7 },
-    Column { name: "next", unit: "step", width: 6 },
-    Column { name: "slowest", unit: "ms", width: 8 },
-];
+use pgs_command::output::table::{Cell as Shown, Table, text};
 
 /// The number of cells that passed each check.
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,18 +40,18 @@ impl Tally {
         all
     }
 
-    fn cells(&self, name: &str, must: &str) -> [String; 9] {
-        [
-            name.to_owned(),
-            must.to_owned(),
-            grouped(self.tried),
-            grouped(self.happened),
-            grouped(self.named),
-            grouped(self.bodies),
-            grouped(self.in_time),
-            grouped(self.next),
-            format!("{:.3}", self.slowest_ms),
-        ]
+    fn row(&self, table: &mut Table, name: &str, must: &str) {
+        table.row([
+            ("fault", "fault", text(name)),
+            ("must", "must", text(must)),
+            ("tried", "tried\ncells", Shown::Whole(self.tried)),
+            ("happened", "happened", Shown::Whole(self.happened)),
+            ("named", "cause\nnamed", Shown::Whole(self.named)),
+            ("bodies", "bodies\nright", Shown::Whole(self.bodies)),
+            ("in_time", "in time", Shown::Whole(self.in_time)),
+            ("next", "next\nstep", Shown::Whole(self.next)),
+            ("slowest_ms", "slowest\nms", Shown::Number(self.slowest_ms, 3)),
+        ]);
     }
 
     pub(super) fn to_json(self) -> Value {
@@ -84,7 +72,7 @@ impl Tally {
 /// and failures.
 pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<()> {
     let cells = || all.iter().flat_map(|tried| &tried.cells);
-    heading(out, &COLUMNS)?;
+    let mut table = Table::new("kinds", "Kinds of faults");
     let mut kinds: Vec<&str> = Vec::new();
     for (cell, _) in cells() {
         if !kinds.contains(&cell.kind.name()) {
@@ -95,9 +83,10 @@ pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<(
         let of_kind = || cells().filter(|(cell, _)| cell.kind.name() == kind);
         let survive = of_kind().all(|(cell, _)| cell.expected == Expected::SameBits);
         let must = if survive { "survive" } else { "fail" };
-        line(out, &COLUMNS, Tally::of(of_kind()).cells(kind, must))?;
+        Tally::of(of_kind()).row(&mut table, kind, must);
     }
-    line(out, &COLUMNS, Tally::of(cells()).cells("all", ""))?;
+    Tally::of(cells()).row(&mut table, "all", "");
+    write!(out, "{}", table.to_text(usize::MAX))?;
 
     writeln!(out)?;
     for ProfileResults { name, cells, .. } in all {

@@ -19,8 +19,8 @@ use pgs_command::common::AcceleratorChoice;
 use pgs_command::failure::Failure;
 use pgs_command::options::scenes::CONTACT_REACH;
 
-/// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for a
-/// millisecond; for reading all registers after a timeout; and for the reset of all parts.
+/// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for
+/// a millisecond; for reading all registers after a timeout; and for the reset of all parts.
 const DEADLINE: Duration = Duration::from_millis(100);
 const SIMULATOR_DEADLINE: Duration = Duration::from_micros(200);
 const LOOKING: Duration = Duration::from_micros(100);

@@ -101,7 +101,8 @@ fn role(node: &UioNode) -> (Option<String>, Option<(&'static str, String)>) {
         }
         Some(NodePart::Unnamed) => {
             let reason = format!(
-                "regions where the accelerator's lie, without their names: give it `reg-names`, and \
+                "regions where the accelerator's lie, without their names: give it `reg-names`, \
+                 and \
                  {}; see device-tree/zynq-pgs.dtsi",
                 uio_name(UIO_NODE)
             );

@@ -1,5 +1,5 @@
-//! Steps the same scene beside a run, cold and with one friction: what a board without a warm start makes of
-//! it.
+//! Steps the same scene beside a run, cold and with one friction: what a board without a warm start
+//! makes of it.
 
 use scene::Scene;
 use serde_json::{Value, json};
@@ -7,12 +7,12 @@ use zynq_pgs::{Accelerator, StepParameters};
 
 use super::row::{Row, step};
 use super::summary::FinalState;
-use pgs_command::output::table::Column;
+use pgs_command::output::table::Fixed;
 
 /// The columns that the scene adds to the table of the run.
-pub(super) const COLUMNS: [Column; 2] = [
-    Column { name: "deepest", unit: "cold mm", width: 9 },
-    Column { name: "kinetic", unit: "cold kJ", width: 9 },
+pub(super) const COLUMNS: [Fixed; 2] = [
+    Fixed { name: "deepest", unit: "cold mm", width: 9 },
+    Fixed { name: "kinetic", unit: "cold kJ", width: 9 },
 ];
 
 /// The scene, and its last step.
@@ -31,8 +31,8 @@ pub(super) struct Beside {
     kinetic_energy: f64,
 }
 
-/// Whether the scene is stepped: as the user chooses, or by default unless the energy of a step is to be
-/// measured, to which the steps of two scenes would add up.
+/// Whether the scene is stepped: as the user chooses, or by default unless the energy of a step is
+/// to be measured, to which the steps of two scenes would add up.
 pub(super) fn is_stepped(choice: Option<bool>, by_default: bool, has_sensors: bool) -> bool {
     choice.unwrap_or(by_default && !has_sensors)
 }

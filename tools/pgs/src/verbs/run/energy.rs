@@ -12,13 +12,14 @@ pub(super) fn sensors(is_emulated: bool) -> Option<Sensors> {
     if is_emulated { None } else { Sensors::find(Path::new(HWMON)) }
 }
 
-/// Samples the idle board, then begins to sample the steps. Sensors beside a second scene measure nothing:
-/// they would see the steps of both.
+/// Samples the idle board, then begins to sample the steps. Sensors beside a second scene measure
+/// nothing: they would see the steps of both.
 pub(super) fn start(sensors: Option<Sensors>, is_alone: bool) -> Option<PowerMeter> {
     let sensors = sensors?;
     if !is_alone {
         log::warn!(
-            "the energy is not measured: the sensors also see the steps of the cold scene; leave out \
+            "the energy is not measured: the sensors also see the steps of the cold scene; leave \
+             out \
              --beside-cold"
         );
         return None;
@@ -32,8 +33,8 @@ pub(super) fn start(sensors: Option<Sensors>, is_alone: bool) -> Option<PowerMet
     }
 }
 
-/// The energy of a step for people and for programs: measured, or at the thesis' power for a step that
-/// takes `ms` milliseconds. None without a step.
+/// The energy of a step for people and for programs: measured, or at the thesis' power for a step
+/// that takes `ms` milliseconds. None without a step.
 pub(super) fn end(meter: Option<PowerMeter>, steps: u32, ms: f64) -> Option<(String, Value)> {
     let steps = NonZeroU32::new(steps)?;
     match meter.map(|meter| meter.stop(steps)) {

@@ -24,24 +24,43 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb or .gltf for 3D programs; `docs/command-line.md` has the
-    /// arrays.
+    /// Write the poses: .npz for numpy, .glb or .gltf for 3D programs; `docs/command-line.md` has
+    /// the arrays.
     #[arg(long, value_name = "FILE", value_parser = poses_file)]
     poses: Option<PosesFile>,
     /// Write a page that plays the poses in a browser, without a network.
-    #[arg(long, value_name = "FILE.html", value_parser = |text: &str| with_extension(text, &["html"]))]
+    #[arg(
+        long,
+        value_name = "FILE.html",
+        value_parser = |text: &str| with_extension(text, &["html"])
+    )]
     view: Option<PathBuf>,
     /// Write a picture of the last step.
-    #[arg(long, value_name = "FILE.png|svg", value_parser = |text: &str| with_extension(text, &["png", "svg"]))]
+    #[arg(
+        long,
+        value_name = "FILE.png|svg",
+        value_parser = |text: &str| with_extension(text, &["png", "svg"])
+    )]
     picture: Option<PathBuf>,
     /// Record every K-th step [default: the smallest K that gives at most 200 frames]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
     /// Record about N frames beside the start, evenly spread.
-    #[arg(long, value_name = "N", conflicts_with = "every", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        conflicts_with = "every",
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     frames: Option<u32>,
-    /// Record N frames a simulated second, with poses between two steps where a frame lies between them
-    #[arg(long, value_name = "N", conflicts_with_all = ["every", "frames"], value_parser = clap::value_parser!(u16).range(1..=1000))]
+    /// Record N frames a simulated second, with poses between two steps where a frame lies between
+    /// them
+    #[arg(
+        long,
+        value_name = "N",
+        conflicts_with_all = ["every", "frames"],
+        value_parser = clap::value_parser!(u16).range(1..=1000)
+    )]
     frames_per_second: Option<u16>,
 }
 

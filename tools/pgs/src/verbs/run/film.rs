@@ -46,8 +46,8 @@ impl Rhythm {
 }
 
 impl FrameClock {
-    /// The next frame, if it lies before this number of steps: the steps before it, the part of a step after
-    /// them, and its bodies.
+    /// The next frame, if it lies before this number of steps: the steps before it, the part of a
+    /// step after them, and its bodies.
     fn next(&mut self, steps: u32, bodies: &[Body]) -> Option<(u32, f32, Vec<Body>)> {
         if self.steps >= steps {
             return None;
@@ -135,7 +135,8 @@ mod tests {
 
     const TIME_STEP: f32 = 1.0 / 60.0;
 
-    /// Films five steps; a cube falls by 1 m in each. Returns the steps, the time and the fall of every frame.
+    /// Films five steps; a cube falls by 1 m in each. Returns the steps, the time and the fall of
+    /// every frame.
     fn frames(rhythm: impl Fn(&Scene) -> Rhythm) -> Vec<(u32, f32, f32)> {
         let grid = "1x1x1".parse().expect("a grid");
         let options = SceneOptions { grid, ..SceneOptions::default() };

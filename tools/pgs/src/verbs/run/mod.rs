@@ -37,7 +37,7 @@ use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
-use pgs_command::output::table::{Column, heading, line};
+use pgs_command::output::table::{Fixed, heading, line};
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -67,7 +67,8 @@ pile of 30 layers sinks 0.2 m into itself and bounces.
 
 Columns: step; pairs of bodies in contact; deepest penetration in the contacts given to the step;
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
-step on the board, modelled for an emulated board; time of this machine. With --beside-cold the depth
+step on the board, modelled for an emulated board; time of this machine. With --beside-cold the \
+depth
 and the energy of the same scene without a warm start and with one friction, stepped beside it.";
 
 /// The end of the short help.
@@ -96,16 +97,36 @@ pub(crate) struct RunArgs {
     /// Begin each step with the impulses of the last one
     ///
     /// With 0.85 of them, in one more pass of each kind [default: on for --scene shapes]
-    #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(
+        long,
+        value_name = "BOOL",
+        help_heading = "Solver",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "true"
+    )]
     warm_start: Option<bool>,
     /// Give each pair of shapes a friction of its own, from both bodies' kinds [default: on for
     /// --scene shapes, if the collision records of the board have room for it]
-    #[arg(long, value_name = "BOOL", help_heading = "Solver", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(
+        long,
+        value_name = "BOOL",
+        help_heading = "Solver",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "true"
+    )]
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
-    /// deep its bodies sink and how much they move [default: on for --scene shapes with a warm start,
-    /// unless a fault is planned, --wide is given or the energy of a step is measured]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    /// deep its bodies sink and how much they move [default: on for --scene shapes with a warm
+    /// start, unless a fault is planned, --wide is given or the energy of a step is measured]
+    #[arg(
+        long,
+        value_name = "BOOL",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "true"
+    )]
     beside_cold: Option<bool>,
     #[command(flatten)]
     ordering: OrderingArgs,
@@ -124,15 +145,16 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     traced: TracedArgs,
     /// Step to show the inside of [default: the last]
-    #[arg(long, value_name = "N", help_heading = "Inside a step (emulated board)", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", help_heading = "Inside a step (emulated \
+        board)", value_parser = clap::value_parser!(u32).range(1..))]
     traced_step: Option<u32>,
     #[command(flatten)]
     files: FileArgs,
 }
 
 impl RunArgs {
-    /// The parameters of a step. The shapes ask for all that a board can; a choice of the user's is taken
-    /// as it is.
+    /// The parameters of a step. The shapes ask for all that a board can; a choice of the user's is
+    /// taken as it is.
     fn parameters(&self, can: &Capabilities) -> StepParameters {
         let shapes = !self.scene.is_cubes();
         let warm = self.warm_start.unwrap_or(shapes);
@@ -173,8 +195,8 @@ impl RunArgs {
         Ok(self.traced.tracing(opened)?.map(|tracing| (tracing, step)))
     }
 
-    /// The scene that is stepped beside this one, if one is. A planned fault names a step of the board
-    /// by its number, and the steps of a second scene would shift the numbers.
+    /// The scene that is stepped beside this one, if one is. A planned fault names a step of the
+    /// board by its number, and the steps of a second scene would shift the numbers.
     fn beside(
         &self,
         parameters: &StepParameters,
@@ -368,7 +390,7 @@ fn take_steps(
 }
 
 /// The columns of the default table.
-fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Column> {
+fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
     let own = columns(is_emulated(opened));
     own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold)).collect()
 }

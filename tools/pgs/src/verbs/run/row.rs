@@ -8,7 +8,7 @@ use zynq_pgs::{Accelerator, ContactMemory, StepParameters, StepReport, WarmColli
 
 use pgs_command::board::is_cancelled;
 use pgs_command::numbers::{Bound, grouped};
-use pgs_command::output::table::Column;
+use pgs_command::output::table::Fixed;
 use pgs_command::output::{limit_text, milliseconds, report_json};
 
 /// Share of the last step's impulses that a warm step begins with (Bullet's).
@@ -29,38 +29,38 @@ pub(super) struct Row {
 }
 
 /// The default columns. The times of an emulated board are modelled.
-pub(super) const fn columns(is_emulated: bool) -> [Column; 6] {
+pub(super) const fn columns(is_emulated: bool) -> [Fixed; 6] {
     let (board, host) = if is_emulated { ("modelled", "emulated") } else { ("board", "host") };
     [
-        Column { name: "step", unit: "", width: 6 },
-        Column { name: "pairs", unit: "", width: 9 },
-        Column { name: "deepest", unit: "mm", width: 9 },
-        Column { name: "kinetic", unit: "kJ", width: 11 },
-        Column { name: board, unit: "ms", width: 10 },
-        Column { name: host, unit: if is_emulated { "host ms" } else { "ms" }, width: 10 },
+        Fixed { name: "step", unit: "", width: 6 },
+        Fixed { name: "pairs", unit: "", width: 9 },
+        Fixed { name: "deepest", unit: "mm", width: 9 },
+        Fixed { name: "kinetic", unit: "kJ", width: 11 },
+        Fixed { name: board, unit: "ms", width: 10 },
+        Fixed { name: host, unit: if is_emulated { "host ms" } else { "ms" }, width: 10 },
     ]
 }
 
 /// All columns.
-pub(super) const ALL_COLUMNS: [Column; 18] = [
-    Column { name: "step", unit: "", width: 5 },
-    Column { name: "pairs", unit: "", width: 8 },
-    Column { name: "ground", unit: "pairs", width: 6 },
-    Column { name: "empty", unit: "entries", width: 7 },
-    Column { name: "impulses", unit: "N s", width: 10 },
-    Column { name: "energy", unit: "kJ", width: 9 },
-    Column { name: "formula", unit: "cycles", width: 10 },
-    Column { name: "stalls", unit: "cycles", width: 12 },
-    Column { name: "waits", unit: "cycles", width: 9 },
-    Column { name: "modelled", unit: "ms", width: 9 },
-    Column { name: "moved", unit: "MB", width: 7 },
-    Column { name: "limit", unit: "", width: 8 },
-    Column { name: "hazards", unit: "", width: 9 },
-    Column { name: "detect", unit: "host ms", width: 7 },
-    Column { name: "order", unit: "host ms", width: 7 },
-    Column { name: "pack", unit: "host ms", width: 7 },
-    Column { name: "device", unit: "host ms", width: 7 },
-    Column { name: "unpack", unit: "host ms", width: 7 },
+pub(super) const ALL_COLUMNS: [Fixed; 18] = [
+    Fixed { name: "step", unit: "", width: 5 },
+    Fixed { name: "pairs", unit: "", width: 8 },
+    Fixed { name: "ground", unit: "pairs", width: 6 },
+    Fixed { name: "empty", unit: "entries", width: 7 },
+    Fixed { name: "impulses", unit: "N s", width: 10 },
+    Fixed { name: "energy", unit: "kJ", width: 9 },
+    Fixed { name: "formula", unit: "cycles", width: 10 },
+    Fixed { name: "stalls", unit: "cycles", width: 12 },
+    Fixed { name: "waits", unit: "cycles", width: 9 },
+    Fixed { name: "modelled", unit: "ms", width: 9 },
+    Fixed { name: "moved", unit: "MB", width: 7 },
+    Fixed { name: "limit", unit: "", width: 8 },
+    Fixed { name: "hazards", unit: "", width: 9 },
+    Fixed { name: "detect", unit: "host ms", width: 7 },
+    Fixed { name: "order", unit: "host ms", width: 7 },
+    Fixed { name: "pack", unit: "host ms", width: 7 },
+    Fixed { name: "device", unit: "host ms", width: 7 },
+    Fixed { name: "unpack", unit: "host ms", width: 7 },
 ];
 
 impl Row {
@@ -124,8 +124,8 @@ impl Row {
     }
 }
 
-/// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins with
-/// the impulses of the last one.
+/// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins
+/// with the impulses of the last one.
 pub(super) fn step(
     number: u32,
     parameters: &StepParameters,

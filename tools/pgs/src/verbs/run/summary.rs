@@ -276,7 +276,8 @@ impl<'a> Summary<'a> {
             None => String::new(),
         };
         Some(format!(
-            "{} in {} of {} steps: {:.1} % of the cycles wait for memory{at}, {:.1} % for velocities \
+            "{} in {} of {} steps: {:.1} % of the cycles wait for memory{at}, {:.1} % for \
+             velocities \
              (hazards)",
             limit_text(limit),
             grouped(held.into()),

@@ -95,8 +95,9 @@ pub const TABLES: [DataTable; 6] = [
             row(AFTER, 27, 6, 28, 3_662_280, 1397, 915_570),
         ],
         remarks: &[
-            "The row after the reduction says 28 words a collision, its total counts 27: with 28 it \
-             would be 3,789,280. The record that is streamed has the 28th, the number of contact \
+            "The row after the reduction says 28 words a collision, its total counts 27: with 28 \
+             it would be 3,789,280. The record that is streamed has the 28th, the number of \
+             contact \
              points.",
         ],
     },
@@ -128,7 +129,8 @@ pub const TABLES: [DataTable; 6] = [
         ],
         remarks: &[
             "Six words cannot hold what the integration yields, a position and an orientation: 7 \
-             words, or 13 with the velocities. The result record that is streamed has all 13 in 16.",
+             words, or 13 with the velocities. The result record that is streamed has all 13 in \
+             16.",
         ],
     },
     DataTable {

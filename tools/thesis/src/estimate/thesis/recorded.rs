@@ -1,4 +1,5 @@
-//! Figures that the thesis reports of its designs and of other machines (§4.4.2, §5.4.4, §5.5, Tables
+//! Figures that the thesis reports of its designs and of other machines (§4.4.2, §5.4.4, §5.5,
+//! Tables
 //! 6.1 to 6.11, equation 6.5).
 
 use bitstream_model::Bandwidth;

@@ -1,4 +1,5 @@
-//! Thesis §4.5: how far two solutions of the same steps differ by the order of their collisions alone.
+//! Thesis §4.5: how far two solutions of the same steps differ by the order of their collisions
+//! alone.
 
 mod show;
 
@@ -28,8 +29,10 @@ Examples:
   pgs thesis determinism --drop 5 --pairs 2 --steps 150 --json > orders.json
   pgs thesis determinism --grid 8x8x8 --from 70 --steps 1
 
-The board solves the collisions one after the other in the order sent; only the order differs between
-the runs. Two comparisons: the order as given (the thesis' design) against the order of Bullet's GPU,
+The board solves the collisions one after the other in the order sent; only the order differs \
+between
+the runs. Two comparisons: the order as given (the thesis' design) against the order of Bullet's \
+GPU,
 which is the original; and pairs of random orders (two runs on a GPU), seeds N and N+1, N+2 and N+3.
 The order of the GPU comes from the folder's gpu_order.npy (M) <u4; without this file collisions are
 put into Bullet's cells of 6 m and batches of 64, which is named \"cells\".

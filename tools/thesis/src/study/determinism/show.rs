@@ -72,7 +72,8 @@ impl Outcome {
             "Deviation of positions between two executions, step by step",
             lines(Axis::linear("step"), Axis::log("mean deviation (eq. 4.1), %"), &series),
             format!(
-                "{}: the runs differ by the order of their collisions alone, and the GPU's order is {}. \
+                "{}: the runs differ by the order of their collisions alone, and the GPU's order \
+                 is {}. \
                  The thesis does not say after how many steps its snapshots were taken.",
                 self.subject,
                 self.source()
@@ -102,8 +103,9 @@ impl Outcome {
             ),
             FLOAT_AGAINST_GPU.spread(series),
             format!(
-                "Both orders are solved on the emulated board: no GPU takes part. {}, the GPU's order {}; \
-                 {falls}. A step moves a body by centimetres, its position is metres: one step leads to \
+                "Both orders are solved on the emulated board: no GPU takes part. {}, the GPU's \
+                 order {}; {falls}. A step moves a body by centimetres, its position is metres: \
+                 one step leads to \
                  less than the thesis' figures.",
                 self.subject,
                 self.source()
@@ -115,7 +117,8 @@ impl Outcome {
     fn row_of_pairs(&self, figure: &Figure) -> Option<Row> {
         let of = self.over_pairs.last()?.position_mean_percent;
         let [low, high] = TWO_GPU_RUNS.mean_percent;
-        let subject = "mean deviation of positions between two random orders; the thesis compares two \
+        let subject = "mean deviation of positions between two random orders; the thesis compares \
+            two \
                        executions on the GPU";
         let ours = match self.pairs.len() {
             1 => format!("{:.4} %", of.mean),

@@ -34,10 +34,10 @@ Examples:
 
 The boards start from one state. float is the original; every other build takes the same steps by
 itself, with the collisions as given, and is compared with float as eq. 4.1 of the thesis does.
-Builds are written as for `pgs thesis compare`: half has binary16 throughout. half,thesis16 has the thesis'
-own sixteen bits in its words, and half,thesis16-literal its encoder taken literally: no board has these, the
-reference solver computes them. Unmoved is the share of position components whose bits, as sent to the
-board, a step did not change. Energies are kinetic.
+Builds are written as for `pgs thesis compare`: half has binary16 throughout. half,thesis16 has the
+thesis' own sixteen bits in its words, and half,thesis16-literal its encoder taken literally: no
+board has these, the reference solver computes them. Unmoved is the share of position components
+whose bits, as sent to the board, a step did not change. Energies are kinetic.
 
 The splits are of the sixteen bits of a number into exponent and mantissa (thesis §4.6.4), on the
 numbers that the step after the last one of float gives the board, or on the folder's. The highest

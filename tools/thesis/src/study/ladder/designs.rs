@@ -15,8 +15,8 @@ const ACCESS_CYCLES: [u64; 2] = [30, 50];
 /// Rows of the velocities that a collision reads; it writes the same rows back.
 const ROWS: u32 = 2;
 
-/// Cycles that the velocities' block RAM takes for a collision if each of their words is a row of its
-/// own, in one array: before the thesis' directive `ARRAY_PARTITION` (§5.4.3).
+/// Cycles that the velocities' block RAM takes for a collision if each of their words is a row of
+/// its own, in one array: before the thesis' directive `ARRAY_PARTITION` (§5.4.3).
 const WORD_BY_WORD: u32 = (ROWS + ROWS) * THESIS_WORDS.velocity / PORTS;
 
 /// One stream of 128 bits.
@@ -83,7 +83,8 @@ fn register_accesses(words: u64, cycles: u64) -> u64 {
     words.saturating_mul(cycles)
 }
 
-/// Cycles of a step on one stream of 32 bits each way: a word a cycle, results out while poses come in.
+/// Cycles of a step on one stream of 32 bits each way: a word a cycle, results out while poses come
+/// in.
 fn unreduced_stream(words: Unreduced, step: &StepShape) -> u64 {
     let passes = step.passes().saturating_mul(step.collisions).saturating_mul(words.collision);
     let bodies = step.bodies.saturating_mul(words.velocity + words.pose.max(words.result));

@@ -1,9 +1,9 @@
-//! The study `ladder`: the designs of the thesis' chapter 5 one behind the other, and the factor that
-//! each brings.
+//! The study `ladder`: the designs of the thesis' chapter 5 one behind the other, and the factor
+//! that each brings.
 //!
-//! A design is a profile where there is one. A design that differs in few properties from a profile is
-//! made from it, so that all of them go through one formula. Two designs have other records, or no
-//! streams, and formulae of their own.
+//! A design is a profile where there is one. A design that differs in few properties from a profile
+//! is made from it, so that all of them go through one formula. Two designs have other records, or
+//! no streams, and formulae of their own.
 
 mod designs;
 mod show;
@@ -43,10 +43,20 @@ pub(crate) static LADDER: Measured<Options> = Measured {
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Options {
     /// Collisions of the step.
-    #[arg(long, value_name = "C", default_value_t = thesis::COLLISIONS, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    #[arg(
+        long,
+        value_name = "C",
+        default_value_t = thesis::COLLISIONS,
+        value_parser = clap::value_parser!(u64).range(1..=1 << 40)
+    )]
     pub(crate) collisions: u64,
     /// Moving bodies of the step.
-    #[arg(long, value_name = "B", default_value_t = thesis::BODIES, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    #[arg(
+        long,
+        value_name = "B",
+        default_value_t = thesis::BODIES,
+        value_parser = clap::value_parser!(u64).range(1..=1 << 40)
+    )]
     pub(crate) bodies: u64,
 }
 
@@ -81,7 +91,8 @@ pub(crate) struct Rung {
     /// Cycles of a step, least and most: accesses take a range of cycles.
     pub(crate) cycles: [u64; 2],
     pub(crate) clock_khz: u32,
-    /// Time with the memory bandwidth that a ZCU102 sustains, ms, where memory can limit the design.
+    /// Time with the memory bandwidth that a ZCU102 sustains, ms, where memory can limit the
+    /// design.
     pub(crate) sustained: Option<f64>,
     /// Time of the design before, in units of this one's; none for the first.
     pub(crate) factor: Option<f64>,
@@ -124,7 +135,8 @@ mod tests {
         assert_eq!(cycles[0], accesses);
         assert_eq!(outcome.rungs[0].cycles[1], accesses / 30 * 50);
         assert_eq!(cycles[1], 8 * 56 * collisions + 25 * bodies);
-        // Twelve cycles a collision; fill 4 x 374 + 4 x 314 + 264; 6 + 7 words a body, four a cycle.
+        // Twelve cycles a collision; fill 4 x 374 + 4 x 314 + 264; 6 + 7 words a body, four a
+        // cycle.
         let wide = 8 * 12 * collisions + 2_752 + 264 + (6 + 7) * bodies / 4;
         assert_eq!(cycles[3], wide);
         assert_eq!(

@@ -73,7 +73,8 @@ impl Outcome {
             ("figure-ladder", "Chapter 5"),
             "How many times as fast each design is as the one before it",
             bars("times", &names, &["over the design before".to_owned()], &factors),
-            "From words that the processor writes one by one to half precision, on the thesis' step.",
+            "From words that the processor writes one by one to half precision, on the thesis' \
+             step.",
         )
         .modelled();
         let row = |rung: &Rung, subject: &str, recorded: String, ours| Row {

@@ -1,8 +1,8 @@
-//! The study `stopping`: what each rule by which the thesis ends an iterative solver (§2.2.3) costs in
-//! passes, and what a fixed number of passes leaves.
+//! The study `stopping`: what each rule by which the thesis ends an iterative solver (§2.2.3) costs
+//! in passes, and what a fixed number of passes leaves.
 //!
-//! The board takes the same step with 0, 1, 2 ... passes; the impulses and velocities that it gives out
-//! are judged on the host ([`residual`]). No other solver runs.
+//! The board takes the same step with 0, 1, 2 ... passes; the impulses and velocities that it gives
+//! out are judged on the host ([`residual`]). No other solver runs.
 
 mod passes;
 pub(crate) mod residual;
@@ -13,22 +13,22 @@ use std::path::PathBuf;
 use clap::Args;
 use scene::Grid;
 use serde::Serialize;
+use zynq_pgs::StepParameters;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
-use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use self::passes::Course;
 pub(crate) use self::passes::Pass;
 use self::residual::Problem;
-use crate::experiment::{Boards, Measured};
+use crate::experiment::{Boards, Measured, Part};
 use crate::session::Session;
-use pgs_command::board::{self, OpenBoard};
+use crate::study::given::GivenStep;
+use pgs_command::board;
 use pgs_command::failure::Failure;
 use pgs_command::options::scenes;
 use pgs_command::options::solver::SolverArgs;
 use pgs_command::pile;
 use pgs_command::step_input;
-use step_folder::folder::Folder;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -56,7 +56,9 @@ pub(crate) static STOPPING: Measured<Options> = Measured {
     thesis: "§2.2.3",
     about: "One step with 0, 1, 2 ... passes, and what is left to solve",
     boards: Boards::Any,
-    run: |options, session| Ok(measure(options, session)?.part()),
+    run: |options, session| {
+        Ok(measure(options, session)?.map_or_else(Part::interrupted, |outcome| outcome.part()))
+    },
 };
 
 /// Its arguments.
@@ -76,7 +78,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub(crate) steps: u32,
     /// Most passes of each kind.
-    #[arg(long, value_name = "K", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=255))]
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 64,
+        value_parser = clap::value_parser!(u32).range(2..=255)
+    )]
     pub(crate) passes: u32,
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
@@ -118,36 +125,25 @@ pub(crate) struct Rules {
     pub(crate) each_change: Option<u32>,
 }
 
-/// The measured step.
-#[derive(Debug)]
-struct Step {
-    /// None for a pile's.
-    folder: Option<Folder>,
-    name: String,
-    bodies: Vec<Body>,
-    shapes: Vec<Shape>,
-    collisions: Vec<Collision>,
-    parameters: StepParameters,
-}
-
-impl Step {
-    /// Makes a failure of the driver's error; for a folder, with the array at fault.
-    fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
-        step_input::failure(self.folder.as_ref(), opened, error)
-    }
-}
-
 /// Takes the step with each number of passes.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Option<Outcome>, Failure> {
     let mut opened = board::open(&session.common, &Build::default())?.stated();
-    session.watch(&mut opened);
-    let step = match &options.input {
-        Some(path) => Some(folder(path, options)?),
-        None => pile(options, session, &mut opened)?,
+    let (name, step) = match &options.input {
+        Some(path) => (path.display().to_string(), Some(GivenStep::folder(path)?)),
+        None => {
+            let Options { grid, drop, steps, .. } = *options;
+            scenes::check_size(grid, opened.accelerator.capabilities())?;
+            let (scene, parameters) = (pile::build(grid, drop)?, StepParameters::default());
+            let parameters = options.solver.apply(parameters);
+            let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
+            (format!("step {} of {grid} cubes dropped from {drop} m", steps + 1), step)
+        }
     };
-    let Some(step) = step else { return Ok(interrupted(options)) };
+    let Some(mut step) = step else { return Ok(None) };
+    session.watch(&mut opened);
+    step.parameters = options.solver.apply(step.parameters);
     step_input::set_shapes(&mut opened.accelerator, &step.shapes)
-        .map_err(|error| step.failure(&opened, error))?;
+        .map_err(|error| step_input::failure(step.folder.as_ref(), &opened, error))?;
     let problem = Problem::new(&step.bodies, &step.shapes, &step.collisions, &step.parameters);
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
     session.expect(2 * u64::from(options.passes) + 2);
@@ -167,9 +163,9 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         contact: Rules::of(&contact, tolerance, |pass| pass.residuals.contact.rms),
         friction: Rules::of(&friction, tolerance, |pass| pass.residuals.friction.rms),
     });
-    Ok(Outcome {
+    Ok(Some(Outcome {
         complete: fixed.is_some(),
-        step: step.name,
+        step: name,
         bodies: step.bodies.len(),
         collisions: step.collisions.len(),
         contact_iterations,
@@ -179,7 +175,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         friction,
         fixed,
         tolerances: tolerances.into(),
-    })
+    }))
 }
 
 impl Rules {
@@ -199,61 +195,6 @@ impl Rules {
     }
 }
 
-fn folder(path: &std::path::Path, options: &Options) -> Result<Step, Failure> {
-    let folder = step_input::load(path)?;
-    Ok(Step {
-        name: path.display().to_string(),
-        parameters: options.solver.apply(folder.parameters),
-        bodies: folder.bodies.clone(),
-        shapes: folder.shapes.clone(),
-        collisions: folder.collisions.clone(),
-        folder: Some(folder),
-    })
-}
-
-/// A pile after its steps; none if Ctrl-C ended them.
-fn pile(
-    options: &Options,
-    session: &Session,
-    opened: &mut OpenBoard,
-) -> Result<Option<Step>, Failure> {
-    let parameters = options.solver.apply(StepParameters::default());
-    let Options { grid, drop, steps, .. } = *options;
-    scenes::check_size(grid, opened.accelerator.capabilities())?;
-    let mut scene = pile::build(grid, drop)?;
-    opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
-    session.expect(steps.into());
-    let taken = pile::step_to(&mut scene, opened, &parameters, steps, || {
-        session.advance();
-        !session.is_interrupted()
-    })?;
-    Ok(taken.then(|| Step {
-        folder: None,
-        name: format!("step {} of {grid} cubes dropped from {drop} m", steps + 1),
-        bodies: scene.bodies().to_vec(),
-        shapes: scene.shapes().to_vec(),
-        collisions: scene.collisions().to_vec(),
-        parameters,
-    }))
-}
-
-fn interrupted(options: &Options) -> Outcome {
-    let parameters = options.solver.apply(StepParameters::default());
-    Outcome {
-        complete: false,
-        step: "interrupted before the measured step".to_owned(),
-        bodies: 0,
-        collisions: 0,
-        contact_iterations: parameters.contact_iterations,
-        friction_iterations: parameters.friction_iterations,
-        spin_damping: parameters.spin_damping,
-        contact: Vec::new(),
-        friction: Vec::new(),
-        fixed: None,
-        tolerances: Vec::new(),
-    }
-}
-
-/// The order in which every number of passes solves the collisions: one, so that each pass goes on from
-/// the one before.
+/// The order in which every number of passes solves the collisions: one, so that each pass goes on
+/// from the one before.
 const ORDER: Order = Order::AsGiven;

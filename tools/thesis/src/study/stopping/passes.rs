@@ -4,9 +4,11 @@ use serde::Serialize;
 use zynq_pgs::{Body, Impulses};
 
 use super::residual::{Part, Problem, Residuals};
-use super::{ORDER, Session, Step};
+use super::{ORDER, Session};
+use crate::study::given::GivenStep;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
+use pgs_command::step_input;
 
 /// The state after a number of passes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -15,8 +17,8 @@ pub(crate) struct Pass {
     pub(crate) residuals: Residuals,
     /// Largest change of an impulse in the last pass, N s; none before the first.
     pub(crate) largest_change_n_s: Option<f64>,
-    /// The largest change as a share of the impulse before the pass; none before the first, and where
-    /// an impulse has begun in the pass.
+    /// The largest change as a share of the impulse before the pass; none before the first, and
+    /// where an impulse has begun in the pass.
     pub(crate) largest_share: Option<f64>,
 }
 
@@ -34,13 +36,13 @@ type Solved = (Vec<Body>, Vec<Impulses>);
 pub(super) struct Course<'a> {
     pub(super) opened: &'a mut OpenBoard,
     pub(super) session: &'a Session,
-    pub(super) step: &'a Step,
+    pub(super) step: &'a GivenStep,
     pub(super) problem: &'a Problem,
 }
 
 impl Course<'_> {
-    /// Takes the step with 0 to `most` passes, each number as contact and friction passes by `split`;
-    /// and whether Ctrl-C let all of them end.
+    /// Takes the step with 0 to `most` passes, each number as contact and friction passes by
+    /// `split`; and whether Ctrl-C let all of them end.
     pub(super) fn take(
         &mut self,
         most: u32,
@@ -78,8 +80,8 @@ impl Course<'_> {
         }))
     }
 
-    /// The velocities and impulses after the passes. Without a pass nothing has changed, and the board
-    /// takes no step.
+    /// The velocities and impulses after the passes. Without a pass nothing has changed, and the
+    /// board takes no step.
     fn solve(&mut self, [contact, friction]: [u32; 2]) -> Result<Option<Solved>, Failure> {
         let mut bodies = self.step.bodies.clone();
         if contact + friction == 0 {
@@ -98,7 +100,9 @@ impl Course<'_> {
         match accelerator.step(&mut bodies, &self.step.collisions, &parameters) {
             Ok(_) => {}
             Err(error) if board::is_cancelled(&error) => return Ok(None),
-            Err(error) => return Err(self.step.failure(self.opened, error)),
+            Err(error) => {
+                return Err(step_input::failure(self.step.folder.as_ref(), self.opened, error));
+            }
         }
         self.opened.alive()?;
         self.session.advance();

@@ -1,8 +1,9 @@
-//! The residual of a step's contact problem, in f64, from the velocities and impulses that a board gave.
+//! The residual of a step's contact problem, in f64, from the velocities and impulses that a board
+//! gave.
 //!
-//! With L an impulse, m the effective mass and e + b the speed along its row, a solved row has
-//! `L = clamp(L - m (e + b))` within the row's bounds: 0 and infinity for a contact, the friction of
-//! its contacts for a tangent. The residual is the difference of both sides over m, which is a speed.
+//! With L an impulse, m the effective mass and e + b the speed along its row, a solved row has `L =
+//! clamp(L - m (e + b))` within the row's bounds: 0 and infinity for a contact, the friction of its
+//! contacts for a tangent. The residual is the difference of both sides over m, which is a speed.
 //! For a contact it is `min(L / m, e + b)`, the residual of the complementarity problem (thesis,
 //! equation 2.19).
 //!

@@ -1,8 +1,8 @@
-//! The study `time-step`: the trade-off of speed against accuracy that the time step decides (thesis
-//! §2.1, Figure 2.2).
+//! The study `time-step`: the trade-off of speed against accuracy that the time step decides
+//! (thesis §2.1, Figure 2.2).
 //!
-//! Two scenes, each for the same simulated time: a body in free flight, whose exact path is known, and
-//! a pile of cubes. The board integrates both.
+//! Two scenes, each for the same simulated time: a body in free flight, whose exact path is known,
+//! and a pile of cubes. The board integrates both.
 
 mod show;
 
@@ -59,10 +59,20 @@ pub(crate) struct Options {
     #[arg(long, value_name = "H", default_value_t = 1.0)]
     pub(crate) drop: f32,
     /// Simulated time, s.
-    #[arg(long, value_name = "S", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=60))]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 2,
+        value_parser = clap::value_parser!(u16).range(1..=60)
+    )]
     pub(crate) seconds: u16,
     /// Contact iterations, and the same number of friction iterations.
-    #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=255))]
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 4,
+        value_parser = clap::value_parser!(u32).range(1..=255)
+    )]
     pub(crate) iterations: u32,
 }
 

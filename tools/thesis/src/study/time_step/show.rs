@@ -78,7 +78,8 @@ impl Outcome {
             "Speed and accuracy against the time step",
             lines(Axis::linear("time step, ms"), Axis::log("error in mm, cost in ms"), &series),
             format!(
-                "{} s of a pile of {} cubes. A shorter step costs more board time (modelled) a simulated \
+                "{} s of a pile of {} cubes. A shorter step costs more board time (modelled) a \
+                 simulated \
                  second, and leaves smaller errors (measured).",
                 self.seconds, self.grid
             ),
