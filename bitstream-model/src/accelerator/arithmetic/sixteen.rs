@@ -74,7 +74,6 @@ pub(crate) fn to_binary16(value: f32) -> u32 {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "the values are exact")]
 mod tests {
     use super::*;
 
