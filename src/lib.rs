@@ -71,12 +71,12 @@ mod axi_dma;
 mod beat;
 #[cfg(feature = "bench")]
 pub mod bench;
-mod board;
-mod check;
+pub mod board;
+pub mod check;
 mod control_block;
 #[cfg(feature = "emulation")]
 pub mod emulation;
-mod error;
+pub mod error;
 mod fault;
 pub mod order;
 pub mod platform;
@@ -84,38 +84,43 @@ mod record;
 pub mod scene;
 mod simd;
 mod step;
-mod validate;
+pub mod validate;
 
-pub use axi_dma::{
-    ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
-};
+/// Channels, registers and their states, as errors and logs have them.
+pub mod diagnosis {
+    pub use crate::axi_dma::{
+        ChannelName, DescriptorState, DescriptorStatus, Direction, DmaError, Dmacr, Dmasr,
+    };
+    pub use crate::control_block::{ControlError, IdentityError};
+    pub use crate::fault::{
+        AcceleratorError, Awaited, ChannelFault, ChannelState, ControlState, Diagnosis, Phase,
+        Subject,
+    };
+    pub use crate::platform::{AccessKind, RegisterAccess};
+}
+
+/// The parts of a [`StepReport`].
+pub mod report {
+    pub use crate::control_block::Saturated;
+    pub use crate::step::{HostTimes, Limit, OrderChoice, StepCycles};
+}
+
 pub use beat::pack::writer::Writer;
 /// The emulated board itself: its configuration, its builder's handle, violations, faults.
 #[cfg(feature = "emulation")]
 pub use bitstream_model as model;
-pub use board::{BoardChoice, BoardDescription, BoardKind, Cancellation, OpenOptions};
-pub use check::{CheckLine, CheckReport, Outcome, check};
-pub use control_block::{Capabilities, ControlError, IdentityError, Saturated};
-pub use error::{Aftermath, BoardTextError, Error, OpenError};
-pub use fault::{
-    AcceleratorError, Awaited, ChannelFault, ChannelState, ControlState, Diagnosis, Fault, Phase,
-    Subject,
-};
+pub use board::{BoardChoice, Cancellation, OpenOptions};
+pub use check::{CheckReport, check};
+pub use control_block::Capabilities;
+pub use error::Error;
+pub use fault::Fault;
 pub use pgs_interface as interface;
-pub use platform::{
-    AccessKind, Caching, DevMemWindows, ManagerChoice, MemoryChoice, PlatformError, RegisterAccess,
-    UIO_CLASS, UioMap, UioNode, uio_nodes,
-};
 pub use scene::{
-    Bodies, Body, BodyArrays, CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact,
-    ContactMemory, Impulses, Pose, Shape, ShapeError, StepParameters, Structures, Velocity,
-    WarmCollisions,
+    Bodies, Body, Collision, Collisions, Contact, ContactMemory, Impulses, Pose, Shape,
+    StepParameters, Velocity, WarmCollisions,
 };
-pub use step::{
-    Accelerator, Detached, HostTimes, InFlight, Limit, OrderChoice, Prepared, StepCycles,
-    StepReport,
-};
-pub use validate::{CapableProfiles, Excess, InputError, InputItem, OutOfRange};
+pub use step::{Accelerator, Detached, InFlight, Prepared, StepReport};
+pub use validate::InputError;
 
 /// The examples of the documents, which are tests.
 #[cfg(all(doctest, feature = "emulation"))]

@@ -10,11 +10,11 @@ use std::fs;
 
 use device_tree::{Tree, sources, tools_found};
 use rtlgen::design::{Design, Parameters};
-use zynq_pgs::DevMemWindows;
 use zynq_pgs::interface::address_map;
 use zynq_pgs::interface::fence::Fence;
 use zynq_pgs::interface::profile::{FLOAT, PROFILES, Profile};
 use zynq_pgs::interface::usr_access::PL_CLOCK_MHZ;
+use zynq_pgs::platform::DevMemWindows;
 
 /// GIC, in device tree bindings: shared peripheral interrupt, and level, active high.
 const SPI: u32 = 0;

@@ -33,7 +33,8 @@ use report::Lines;
 /// afterwards.
 ///
 /// ```
-/// use zynq_pgs::{OpenOptions, Outcome, check};
+/// use zynq_pgs::check::Outcome;
+/// use zynq_pgs::{OpenOptions, check};
 ///
 /// # fn main() -> Result<(), zynq_pgs::Error> {
 /// let report = check(OpenOptions::default())?;

@@ -8,7 +8,7 @@
 //! use zynq_pgs::interface::record::Beat;
 //! use zynq_pgs::platform::{ReservedMemory, UioDevice};
 //!
-//! # fn main() -> Result<(), zynq_pgs::PlatformError> {
+//! # fn main() -> Result<(), zynq_pgs::platform::PlatformError> {
 //! let mut memory = ReservedMemory::open("my-memory")?;
 //! memory.write(0, &[Beat([1, 2, 3, 4])])?;
 //!

@@ -24,7 +24,7 @@ pub struct ShapeError {
 /// ```
 /// use zynq_pgs::Shape;
 ///
-/// # fn main() -> Result<(), zynq_pgs::ShapeError> {
+/// # fn main() -> Result<(), zynq_pgs::scene::ShapeError> {
 /// // A cube of 1 kg with edges of 2 m: inertia 2/3 kg m².
 /// assert_eq!(Shape::cuboid(1.0, [1.0; 3])?, Shape::isotropic(1.0, 1.5));
 /// assert!(!Shape::cuboid(1.0, [2.0, 1.0, 0.5])?.is_isotropic());

@@ -3,10 +3,11 @@
 
 use std::error::Error as _;
 
+use zynq_pgs::board::BoardKind;
+use zynq_pgs::error::{BoardTextError, OpenError};
 use zynq_pgs::model::{Bandwidth, ConfigError, EmulatedBoard};
 use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, BoardTextError, Error, OpenError, OpenOptions, Shape,
-    StepParameters, Velocity, emulation::Build,
+    Accelerator, BoardChoice, Error, OpenOptions, Shape, StepParameters, Velocity, emulation::Build,
 };
 
 use crate::common::{bits, row};

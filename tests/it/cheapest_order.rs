@@ -10,9 +10,8 @@ use bitstream_model::{Bandwidth, BoardConfig, Hazards};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE, Profile};
 use zynq_pgs::order::Order;
-use zynq_pgs::{
-    Body, Collision, Contact, OrderChoice, Shape, StepParameters, StepReport, Velocity,
-};
+use zynq_pgs::report::OrderChoice;
+use zynq_pgs::{Body, Collision, Contact, Shape, StepParameters, StepReport, Velocity};
 
 const SHAPES: [Shape; 3] =
     [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(1e-6, 1e-6)];

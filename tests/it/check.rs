@@ -8,9 +8,9 @@ use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, PROFILES};
 use bitstream_model::{
     BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Master, Quirks, Resettable,
 };
-use zynq_pgs::{
-    Accelerator, BoardChoice, CheckReport, Error, OpenError, OpenOptions, Outcome, check,
-};
+use zynq_pgs::check::Outcome;
+use zynq_pgs::error::OpenError;
+use zynq_pgs::{Accelerator, BoardChoice, CheckReport, Error, OpenOptions, check};
 
 const NAMES: [&str; 12] = [
     "identification",

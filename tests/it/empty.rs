@@ -7,9 +7,10 @@ use bitstream_model::BoardConfig;
 use scene::{Scene, SceneOptions};
 use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE, PROFILES, Profile};
 use zynq_pgs::order::Order;
+use zynq_pgs::scene::{CollisionArrays, Structures};
 use zynq_pgs::{
-    Accelerator, Body, Collision, CollisionArrays, Collisions, Contact, Error, InputError, Shape,
-    StepParameters, StepReport, Structures,
+    Accelerator, Body, Collision, Collisions, Contact, Error, InputError, Shape, StepParameters,
+    StepReport,
 };
 
 /// The orders, and `None` for the board's own choice.

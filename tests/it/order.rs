@@ -13,7 +13,8 @@ use bitstream_model::{BoardConfig, Hazards};
 use scene::{Scene, SceneOptions, kinetic_energy};
 use zynq_pgs::interface::profile::{FLOAT, HALF, NAIVE, Profile};
 use zynq_pgs::order::{Order, OrderError};
-use zynq_pgs::{Body, Collision, Error, Excess, InputError, Shape, StepParameters, StepReport};
+use zynq_pgs::validate::Excess;
+use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, StepReport};
 
 fn with(hazards: Hazards) -> BoardConfig {
     BoardConfig { hazards, ..BoardConfig::default() }

@@ -6,9 +6,10 @@ use crate::common::{at_rest, bits, open, ordered, standing};
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Profile};
 use scene::{Scene, SceneOptions};
+use zynq_pgs::error::Aftermath;
 use zynq_pgs::order::Order;
 use zynq_pgs::{
-    Aftermath, Body, Collision, Contact, Error, Fault, Shape, StepParameters, StepReport, Velocity,
+    Body, Collision, Contact, Error, Fault, Shape, StepParameters, StepReport, Velocity,
 };
 
 fn of(profile: &'static Profile) -> BoardConfig {

@@ -9,9 +9,10 @@ use crate::common::{at_rest, open_with};
 use bitstream_model::BoardConfig;
 use zynq_pgs::interface::profile::{FLOAT, HALF, PROFILES, Profile};
 use zynq_pgs::order::Order;
+use zynq_pgs::scene::Structures;
 use zynq_pgs::{
     Accelerator, Bodies, Body, Collision, Collisions, Contact, Error, InputError, Pose, Shape,
-    StepParameters, Structures, Velocity,
+    StepParameters, Velocity,
 };
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];

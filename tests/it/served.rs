@@ -26,9 +26,12 @@ use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault, FaultKind};
 use pgs_interface::message::{
     ANSWER_BYTES, Answer, LONGEST_WAIT, MEMORY_UNIT, Request, RequestError, Status, VERSION,
 };
+use zynq_pgs::board::BoardKind;
+use zynq_pgs::error::OpenError;
+use zynq_pgs::platform::{MemoryChoice, PlatformError};
 use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, Body, Collision, Error, MemoryChoice, OpenError,
-    OpenOptions, PlatformError, Shape, StepParameters, StepReport, Velocity,
+    Accelerator, BoardChoice, Body, Collision, Error, OpenOptions, Shape, StepParameters,
+    StepReport, Velocity,
 };
 
 /// A row of cubes on the ground.

@@ -5,7 +5,8 @@
 use crate::common;
 use bitstream_model::BoardConfig;
 use scene::{Scene, SceneOptions};
-use zynq_pgs::{Bodies, BodyArrays, CollisionArrays, Collisions, Shape, StepParameters, Velocity};
+use zynq_pgs::scene::{BodyArrays, CollisionArrays};
+use zynq_pgs::{Bodies, Collisions, Shape, StepParameters, Velocity};
 
 #[test]
 fn separate_arrays_give_the_bits_of_arrays_of_structures() {

@@ -9,9 +9,8 @@ use super::life::{assert_works, naive};
 use super::prepared::{CUBES, OTHER, assert_ends, prepare, submit};
 use super::tampered::{Tamper, Tampered};
 use super::{SHAPES, bits, open, scene};
-use crate::{
-    Accelerator, Aftermath, Cancellation, Detached, Error, InputError, StepParameters, StepReport,
-};
+use crate::error::Aftermath;
+use crate::{Accelerator, Cancellation, Detached, Error, InputError, StepParameters, StepReport};
 
 /// What an engine or a handle of another language keeps: the accelerator and its step.
 #[derive(Debug)]

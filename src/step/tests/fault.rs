@@ -11,10 +11,9 @@ use pgs_interface::control::ErrorCode;
 use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
-use crate::{
-    Accelerator, Aftermath, ChannelFault, Direction, Error, Fault, Phase, Shape, StepParameters,
-    StepReport,
-};
+use crate::diagnosis::{ChannelFault, Direction, Phase};
+use crate::error::Aftermath;
+use crate::{Accelerator, Error, Fault, Shape, StepParameters, StepReport};
 
 const DMASR: u32 = 0x04;
 const S2MM: u32 = 0x30;

@@ -15,10 +15,11 @@ use pgs_interface::profile::{FLOAT, Profile};
 
 use super::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
 use super::{SHAPES, bits, open, options, scene, undisturbed};
+use crate::error::Aftermath;
 use crate::order::Order;
 use crate::{
-    Accelerator, Aftermath, Bodies, Body, Cancellation, Collision, Collisions, Error, Fault,
-    InputError, Pose, StepParameters, Velocity,
+    Accelerator, Bodies, Body, Cancellation, Collision, Collisions, Error, Fault, InputError, Pose,
+    StepParameters, Velocity,
 };
 
 const CUBES: u32 = 20;

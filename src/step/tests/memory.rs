@@ -17,12 +17,14 @@ use pgs_interface::record::Beat;
 use super::{bits, found, open_on, scene, undisturbed};
 
 use crate::check::check_found;
+use crate::check::{CheckLine, Outcome};
+use crate::error::Aftermath;
 use crate::platform::{
     Access, Caching, DmaMemory, DmaMemorySource, EmulatedPlatform, HardwarePlatform, ManagerChoice,
     MemoryChoice, Platform, PlatformError, RegisterChoice, RegisterMap, RegisterWindow,
     SharedMemory, uio_fake,
 };
-use crate::{Accelerator, Aftermath, CheckLine, Error, Fault, InputError, Outcome, StepParameters};
+use crate::{Accelerator, Error, Fault, InputError, StepParameters};
 
 const BASE: u64 = 0x6000_0000;
 const BYTES: u64 = 1 << 20;

@@ -21,10 +21,12 @@ use pgs_interface::profile::PROFILES;
 
 use self::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
 use crate::board::open::{BoardDescription, BoardKind, Found};
+use crate::diagnosis::{Awaited, ChannelFault};
+use crate::error::{Aftermath, OpenError};
 use crate::platform::{Access, Platform};
 use crate::{
-    Accelerator, Aftermath, Awaited, BoardChoice, Body, ChannelFault, Collision, Contact, Error,
-    Fault, OpenError, OpenOptions, Pose, Shape, StepParameters, StepReport, Velocity,
+    Accelerator, BoardChoice, Body, Collision, Contact, Error, Fault, OpenOptions, Pose, Shape,
+    StepParameters, StepReport, Velocity,
 };
 
 pub(super) fn open(config: BoardConfig) -> (EmulatedBoard, Accelerator) {
@@ -464,7 +466,7 @@ fn a_length_width_that_the_cores_do_not_have_is_refused() {
     assert!(
         matches!(
             error,
-            Error::Open(OpenError::Core(crate::DmaError::LengthWidth {
+            Error::Open(OpenError::Core(crate::diagnosis::DmaError::LengthWidth {
                 expected: 14,
                 found: 26,
                 ..
@@ -484,7 +486,10 @@ fn cores_without_scatter_gather_are_refused() {
     let board = EmulatedBoard::new(config).expect("a board that can be built");
     let error = Accelerator::open(options(&board)).expect_err("direct mode only");
     assert!(
-        matches!(error, Error::Open(OpenError::Core(crate::DmaError::NoScatterGather { .. }))),
+        matches!(
+            error,
+            Error::Open(OpenError::Core(crate::diagnosis::DmaError::NoScatterGather { .. }))
+        ),
         "{error}"
     );
 }

@@ -7,7 +7,8 @@ use bitstream_model::{Bandwidth, BoardConfig, FaultPlan};
 use super::fault::{CUBES, fault_of, recovered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
-use crate::{ChannelState, Error, StepParameters};
+use crate::diagnosis::ChannelState;
+use crate::{Error, StepParameters};
 
 /// Each line names the fault, and the channel and the phase of the message.
 #[test]

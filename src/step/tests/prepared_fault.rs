@@ -8,8 +8,9 @@ use bitstream_model::{BoardConfig, Direction, Fault as Injected, FaultKind, Faul
 use super::life::{Panicking, assert_works, naive};
 use super::prepared::{CUBES, OTHER, assert_ends, assert_starts, parameters, prepare, submit};
 use super::{bits, open, scene};
+use crate::error::Aftermath;
 use crate::order::Order;
-use crate::{Aftermath, Body, Cancellation, Error, Fault, InputError, StepParameters};
+use crate::{Body, Cancellation, Error, Fault, InputError, StepParameters};
 
 #[test]
 fn a_step_that_fails_on_the_board_leaves_the_prepared_one() {

@@ -11,9 +11,9 @@ use bitstream_model::{Direction as Side, EmulatedBoard, Fault as Injected, Fault
 use super::fault::{CUBES, fault_of};
 use super::tampered::Tampered;
 use super::{SHAPES, scene, step};
-use crate::{
-    Accelerator, Aftermath, Cancellation, Error, Fault, InFlight, PlatformError, StepParameters,
-};
+use crate::error::Aftermath;
+use crate::platform::PlatformError;
+use crate::{Accelerator, Cancellation, Error, Fault, InFlight, StepParameters};
 
 fn accesses(board: &EmulatedBoard) -> u64 {
     board.counts().register_reads + board.counts().register_writes

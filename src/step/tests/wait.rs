@@ -11,7 +11,8 @@ use super::fault::{CUBES, fault_of};
 use super::tampered::{CONTROL_BLOCK, Tamper, Tampered};
 use super::{bits, open, scene, step, undisturbed};
 use crate::board::anomalies::Anomaly;
-use crate::{Aftermath, Cancellation, Error, InputError, StepParameters};
+use crate::error::Aftermath;
+use crate::{Cancellation, Error, InputError, StepParameters};
 
 const DMASR: u32 = 0x04;
 const S2MM: u32 = 0x30;

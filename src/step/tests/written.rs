@@ -8,9 +8,9 @@ use pgs_interface::profile::{PROFILES, Profile};
 
 use super::{bits, open, scene};
 use crate::order::Order;
+use crate::validate::Excess;
 use crate::{
-    Accelerator, Body, Collision, Error, Excess, InputError, Prepared, StepParameters, Velocity,
-    Writer,
+    Accelerator, Body, Collision, Error, InputError, Prepared, StepParameters, Velocity, Writer,
 };
 
 /// More than three blocks of records.

@@ -47,7 +47,8 @@ pub struct Impulses {
 
 /// The driver reads the collisions and impulses of C where they lie.
 const _: () = {
-    use zynq_pgs::{CONTACT_POINTS, Collision as Driver, Contact as Point, Impulses as Sums};
+    use zynq_pgs::scene::CONTACT_POINTS;
+    use zynq_pgs::{Collision as Driver, Contact as Point, Impulses as Sums};
     assert!(size_of::<Impulses>() == size_of::<Sums>());
     assert!(align_of::<Impulses>() == align_of::<Sums>());
     assert!(offset_of!(Impulses, normal) == offset_of!(Sums, normal));

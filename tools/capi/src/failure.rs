@@ -76,7 +76,8 @@ fn chain(error: &Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zynq_pgs::{Aftermath, InputError};
+    use zynq_pgs::InputError;
+    use zynq_pgs::error::Aftermath;
 
     fn step(fault: Fault, aftermath: Aftermath) -> Failure {
         Error::Step { fault: Box::new(fault), aftermath, diagnosis: None }.into()

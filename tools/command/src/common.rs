@@ -5,7 +5,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use zynq_pgs::{BoardChoice, BoardTextError, ManagerChoice, MemoryChoice};
+use zynq_pgs::BoardChoice;
+use zynq_pgs::error::BoardTextError;
+use zynq_pgs::platform::{ManagerChoice, MemoryChoice};
 
 use crate::environment::{BOARD, MANAGER, MEMORY, RTL, is_blank};
 use crate::options::memory::memory_choice;

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use zynq_pgs::{Aftermath, ChannelState, Diagnosis, Error, Fault};
+use zynq_pgs::diagnosis::{ChannelState, Diagnosis};
+use zynq_pgs::error::Aftermath;
+use zynq_pgs::{Error, Fault};
 
 use crate::failure::{Cause, Failure};
 

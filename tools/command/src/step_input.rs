@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use thiserror::Error;
-use zynq_pgs::{Accelerator, Excess, InputError, InputItem, OutOfRange, Shape};
+use zynq_pgs::validate::{Excess, InputItem, OutOfRange};
+use zynq_pgs::{Accelerator, InputError, Shape};
 
 use crate::board::OpenBoard;
 use crate::failure::Failure;

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 
 use pgs_support::chunks::Chunks;
 use thiserror::Error;
-use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact, Pose, Shape, StepParameters, Velocity};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision, Contact, Pose, Shape, StepParameters, Velocity};
 
 use crate::npy::{self, Dimensions, Element, NpyError, Problem};
 use crate::replace::{ReplaceError, Replacement};

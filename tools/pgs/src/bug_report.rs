@@ -7,7 +7,8 @@ use bitstream_model::EmulatedBoard;
 use clap::Args;
 use serde_json::{Value, json};
 use step_folder::replace::replace;
-use zynq_pgs::{Diagnosis, Error, StepParameters};
+use zynq_pgs::diagnosis::Diagnosis;
+use zynq_pgs::{Error, StepParameters};
 
 use pgs_command::board::OpenBoard;
 use pgs_command::diagnosis;

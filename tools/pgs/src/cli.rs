@@ -123,7 +123,7 @@ pub(crate) fn parse(
 mod tests {
     use bitstream_model::interface::address_map::UIO_NODE;
     use clap::error::ErrorKind;
-    use zynq_pgs::{ManagerChoice, MemoryChoice};
+    use zynq_pgs::platform::{ManagerChoice, MemoryChoice};
 
     use super::*;
     use pgs_command::common::BoardName;

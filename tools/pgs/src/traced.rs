@@ -9,7 +9,8 @@ use clap::Args;
 use serde_json::{Value, json};
 use step_folder::replace::Replacement;
 use step_trace::TracedStep;
-use zynq_pgs::{BoardKind, StepReport};
+use zynq_pgs::StepReport;
+use zynq_pgs::board::BoardKind;
 
 use pgs_command::board::OpenBoard;
 use pgs_command::failure::Failure;

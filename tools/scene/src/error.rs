@@ -1,6 +1,7 @@
 //! The errors of building a scene.
 
-use zynq_pgs::{Pose, ShapeError};
+use zynq_pgs::Pose;
+use zynq_pgs::scene::ShapeError;
 
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,6 +1,7 @@
 //! The geometry of a body, and the mass properties that follow from it.
 
-use zynq_pgs::{Shape, ShapeError};
+use zynq_pgs::Shape;
+use zynq_pgs::scene::ShapeError;
 
 use crate::{CUBE_HALF_EXTENT, hull};
 

@@ -8,11 +8,12 @@ use pgs_interface::record::Beat;
 use super::kinds::{Mistake, Trouble};
 use super::planted::Planted;
 use super::{Bench, Verdict, assert_reported, chain_of, clean, found};
+use crate::StepParameters;
 use crate::board::bank::Bank;
+use crate::check::Outcome;
 use crate::check::check_found;
 use crate::platform::{Access, CpuBuffer, DeviceBuffer, PlatformError};
 use crate::step::tests::{bits, scene};
-use crate::{Outcome, StepParameters};
 
 #[test]
 fn mistake_13_caches_not_maintained() {
@@ -27,7 +28,8 @@ fn mistake_13_caches_not_maintained() {
             let planted = Planted::new(BoardConfig::default(), mistake, None);
             planted.opened();
             let report = check_found(found(&planted), None).map_err(|error| error.to_string())?;
-            let failed = |line: &&crate::CheckLine| matches!(line.outcome, Outcome::Failed { .. });
+            let failed =
+                |line: &&crate::check::CheckLine| matches!(line.outcome, Outcome::Failed { .. });
             match report.lines.iter().filter(failed).map(|line| line.name).collect::<Vec<_>>() {
                 lines if lines.is_empty() => Ok(()),
                 lines => Err(lines.join(", ")),

@@ -3,7 +3,8 @@
 use std::ptr::NonNull;
 use std::slice;
 
-use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Pose, Structures, Velocity};
+use zynq_pgs::scene::Structures;
+use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Pose, Velocity};
 
 use super::overlap::Span;
 use super::pointer::{extent, misaligned};

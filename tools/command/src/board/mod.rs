@@ -10,12 +10,12 @@ use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
 use serde_json::{Value, json};
+use zynq_pgs::board::BoardKind;
 use zynq_pgs::emulation::Build;
+use zynq_pgs::platform::{DevMemWindows, MemoryChoice};
 use zynq_pgs::platform::{System, uio_listing};
-use zynq_pgs::{
-    Accelerator, BoardChoice, BoardKind, DevMemWindows, Excess, Fault, MemoryChoice, OpenOptions,
-    StepParameters,
-};
+use zynq_pgs::validate::Excess;
+use zynq_pgs::{Accelerator, BoardChoice, Fault, OpenOptions, StepParameters};
 
 use self::accelerator::dead;
 pub use self::accelerator::{emulated_board, external_accelerator};

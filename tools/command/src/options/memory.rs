@@ -5,7 +5,7 @@ use std::ops::Range;
 use bitstream_model::interface::address_map::{
     MEMORY_BASE, MEMORY_BYTES, U_DMA_BUF, UIO_MEMORY_NODE,
 };
-use zynq_pgs::{Caching, MemoryChoice};
+use zynq_pgs::platform::{Caching, MemoryChoice};
 
 const EXPECTED: &str = "expected auto, u-dma-buf[:NAME[:write-combining]], uio[:NODE] \
                         or devmem[:ADDRESS+BYTES]";

@@ -10,7 +10,8 @@ pub mod width;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use zynq_pgs::{Limit, StepReport};
+use zynq_pgs::StepReport;
+use zynq_pgs::report::Limit;
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub const SCHEMA: u32 = 1;

@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 use zynq_pgs::order::Order;
-use zynq_pgs::{Capabilities, OrderChoice, StepReport};
+use zynq_pgs::report::OrderChoice;
+use zynq_pgs::{Capabilities, StepReport};
 
 use crate::numbers::grouped;
 use crate::options::ordering::{is_sequential, name};

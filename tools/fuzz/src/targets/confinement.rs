@@ -1,9 +1,10 @@
 //! Takes random steps of the driver on a board that checks every access.
 
 use bitstream_model::EmulatedBoard;
+use zynq_pgs::scene::{BodyArrays, CollisionArrays};
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, BodyArrays, CollisionArrays, Error, Fault, OpenOptions,
-    StepParameters, StepReport, WarmCollisions,
+    Accelerator, BoardChoice, Body, Error, Fault, OpenOptions, StepParameters, StepReport,
+    WarmCollisions,
 };
 
 use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};

@@ -2,7 +2,8 @@
 //! does: fields anywhere in a record, and words between them that must not change.
 
 use pgs_support::chunks::Chunks;
-use zynq_pgs::{Bodies, Body, CONTACT_POINTS, Collision, Collisions, Contact, Pose, Velocity};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Bodies, Body, Collision, Collisions, Contact, Pose, Velocity};
 
 /// The words between the fields.
 const CANARY: f32 = -7.25;

@@ -3,7 +3,7 @@
 use std::fs;
 
 use pgs_loading::{AtFault, Request, check};
-use zynq_pgs::ManagerChoice;
+use zynq_pgs::platform::ManagerChoice;
 
 use super::files::{self, BODY, DESYNCED, HEAD};
 use crate::input::Input;

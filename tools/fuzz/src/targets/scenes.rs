@@ -2,9 +2,9 @@
 
 use zynq_pgs::interface::profile::Variant;
 use zynq_pgs::order::Order;
+use zynq_pgs::scene::CONTACT_POINTS;
 use zynq_pgs::{
-    Body, CONTACT_POINTS, Collision, Contact, Impulses, Pose, Shape, StepParameters, Velocity,
-    WarmCollisions,
+    Body, Collision, Contact, Impulses, Pose, Shape, StepParameters, Velocity, WarmCollisions,
 };
 
 use crate::input::Input;

@@ -1,8 +1,8 @@
 //! Checks without a transfer: names, addresses, bounds, memory.
 
-use zynq_pgs::PlatformError;
 use zynq_pgs::interface::address_map::{MEMORY_BASE, MEMORY_BYTES, UIO_MEMORY_NODE};
 use zynq_pgs::interface::record::{BEAT_BYTES, Beat};
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::{ReservedMemory, UioDevice};
 
 use crate::Outcome;

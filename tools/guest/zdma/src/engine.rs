@@ -5,8 +5,8 @@
 
 use std::time::{Duration, Instant};
 
-use zynq_pgs::PlatformError;
 use zynq_pgs::interface::record::BEAT_BYTES;
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::{ReservedMemory, UioDevice, UioWindow};
 
 /// Interrupt status; a written 1 clears.

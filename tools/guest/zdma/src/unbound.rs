@@ -8,8 +8,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use zynq_pgs::PlatformError;
 use zynq_pgs::interface::address_map::{UIO_CONTROL_MAP, UIO_MEMORY_NODE, UIO_NODE};
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::{UIO_CLASS, UioDevice};
 
 use crate::Outcome;

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
-use zynq_pgs::PlatformError;
+use zynq_pgs::platform::PlatformError;
 
 use super::chip::Chip;
 use super::progress::Stage;

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use zynq_pgs::ManagerChoice;
+use zynq_pgs::platform::ManagerChoice;
 use zynq_pgs::platform::{FpgaManager, find_manager};
 
 use super::system::{System, read};

@@ -40,8 +40,8 @@ use bitstream_model::interface::address_map::{
     CONTROL_BASE, CONTROL_BYTES, DMA_BASE, UIO_GUARD_NODE, UIO_MEMORY_NODE, UIO_NODE,
 };
 use bitstream_model::interface::usr_access;
+use zynq_pgs::platform::{ManagerChoice, UioNode};
 use zynq_pgs::platform::{UioListing, uio_listing};
-use zynq_pgs::{ManagerChoice, UioNode};
 
 pub use chip::Chip;
 pub use error::{AtFault, LoadError};

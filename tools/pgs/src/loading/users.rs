@@ -9,7 +9,7 @@ use std::io;
 use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 
-use zynq_pgs::PlatformError;
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::{self, DeviceLock, UioListing, UnreadableNode, u_dma_buf_names};
 
 use super::others::{driver, is_of_logic};

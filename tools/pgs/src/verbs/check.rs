@@ -8,7 +8,8 @@ use bitstream_model::{
 };
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use zynq_pgs::{CheckLine, CheckReport, Outcome, check};
+use zynq_pgs::check::{CheckLine, Outcome};
+use zynq_pgs::{CheckReport, check};
 
 use pgs_command::board::{self, ChosenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};

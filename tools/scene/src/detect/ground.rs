@@ -6,7 +6,8 @@
 //! the three lowest corners; a sphere with its lowest point, a capsule with the lowest point of
 //! each end.
 
-use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision, Contact};
 
 use super::MARGIN;
 use crate::{GROUND, Geometry, rotation};

@@ -8,7 +8,8 @@
 //! Bullet keeps its manifolds, too, and lets points drift by 2 cm (`btPersistentManifold`).
 
 use parry3d::math::{Pose, Vector};
-use zynq_pgs::{Body, CONTACT_POINTS, Collision, Contact};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision, Contact};
 
 use super::parry::{Parry, pose};
 use super::reduce::reduce;

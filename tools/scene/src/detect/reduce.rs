@@ -11,7 +11,8 @@
 //! result may have fewer points. Every computation is f32 in the order written.
 
 use parry3d::math::Vector;
-use zynq_pgs::{CONTACT_POINTS, Contact};
+use zynq_pgs::Contact;
+use zynq_pgs::scene::CONTACT_POINTS;
 
 use super::parry::Place;
 

@@ -1,6 +1,7 @@
 //! Measures the penetration of bodies.
 
-use zynq_pgs::{Body, CONTACT_POINTS, Collision};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision};
 
 use super::{dot, rotation, to_body, to_world};
 

@@ -7,7 +7,8 @@ use step_folder::folder::{
     Folder,
 };
 use thiserror::Error;
-use zynq_pgs::{Body, CONTACT_POINTS, Collision};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision};
 
 /// How far the length of a unit normal may lie from 1.
 const UNIT_TOLERANCE: f32 = 1e-3;

@@ -1,6 +1,7 @@
 //! Collects the numbers of a step by kind.
 
-use zynq_pgs::{Body, CONTACT_POINTS, Collision, Shape};
+use zynq_pgs::scene::CONTACT_POINTS;
+use zynq_pgs::{Body, Collision, Shape};
 
 /// The sums that include a kind of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -172,7 +172,8 @@ pub(crate) fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>, 
 
 #[cfg(test)]
 mod tests {
-    use zynq_pgs::{CONTACT_POINTS, Contact, Pose, Velocity};
+    use zynq_pgs::scene::CONTACT_POINTS;
+    use zynq_pgs::{Contact, Pose, Velocity};
 
     use super::*;
 

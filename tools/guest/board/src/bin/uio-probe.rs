@@ -10,7 +10,7 @@ use bitstream_model::interface::address_map::{
 };
 use bitstream_model::interface::record::Beat;
 use guest_board::one_cube::{self, Machine};
-use zynq_pgs::PlatformError;
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::{ReservedMemory, UioDevice, UioWindow};
 
 /// Time limit of the step.

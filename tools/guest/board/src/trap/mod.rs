@@ -8,7 +8,7 @@ mod regions;
 #[cfg(all(target_arch = "aarch64", target_os = "linux"))]
 mod tracer;
 
-use zynq_pgs::PlatformError;
+use zynq_pgs::platform::PlatformError;
 use zynq_pgs::platform::UioWindow;
 
 use crate::mailbox::Words;

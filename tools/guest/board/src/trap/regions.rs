@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_DMA_NODES, UIO_NODE};
-use zynq_pgs::UioNode;
+use zynq_pgs::platform::UioNode;
 
 /// A UIO node whose regions are registers of the board.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -129,7 +129,7 @@ mod tests {
             }
             fs::write(root.path().join(format!("uio{number}/name")), name).expect("written");
         }
-        let nodes = zynq_pgs::uio_nodes(root.path()).expect("readable");
+        let nodes = zynq_pgs::platform::uio_nodes(root.path()).expect("readable");
         let nodes = Node::of_the_board(&nodes, Path::new("/dev"));
         let paths: Vec<_> = nodes.iter().map(|node| node.path.as_path()).collect();
         assert_eq!(paths, [Path::new("/dev/uio2"), Path::new("/dev/uio3")]);

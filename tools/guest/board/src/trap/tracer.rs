@@ -17,8 +17,8 @@ use nix::sys::ptrace::{self, Options};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{Pid, SysconfVar, sysconf};
+use zynq_pgs::platform::{PlatformError, uio_nodes};
 use zynq_pgs::platform::{System, UioDevice, UioWindow};
-use zynq_pgs::{PlatformError, uio_nodes};
 
 use super::{Node, Regions};
 use crate::instruction::{self, Registers};

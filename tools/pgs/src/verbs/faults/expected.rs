@@ -2,7 +2,7 @@
 
 use bitstream_model::interface::control::ErrorCode;
 use bitstream_model::{Consequence, Direction, FaultKind};
-use zynq_pgs::Aftermath;
+use zynq_pgs::error::Aftermath;
 
 /// The expected outcome of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

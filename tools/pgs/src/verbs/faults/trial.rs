@@ -7,9 +7,10 @@ use bitstream_model::{
     BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount, Subnormals,
 };
 use scene::{Grid, Scene, SceneOptions};
+use zynq_pgs::error::Aftermath;
 use zynq_pgs::{
-    Accelerator, Aftermath, BoardChoice, Body, Collision, ContactMemory, Error, Impulses,
-    OpenOptions, Shape, StepParameters, WarmCollisions,
+    Accelerator, BoardChoice, Body, Collision, ContactMemory, Error, Impulses, OpenOptions, Shape,
+    StepParameters, WarmCollisions,
 };
 
 use super::cells::Cell;
@@ -320,8 +321,8 @@ pub(super) fn run(bench: &Bench, cell: &Cell) -> CellResult {
 fn channel_of(error: &Error) -> Option<(usize, Direction)> {
     let name = error.fault()?.channel()?;
     let direction = match name.direction {
-        zynq_pgs::Direction::Mm2s => Direction::Mm2s,
-        zynq_pgs::Direction::S2mm => Direction::S2mm,
+        zynq_pgs::diagnosis::Direction::Mm2s => Direction::Mm2s,
+        zynq_pgs::diagnosis::Direction::S2mm => Direction::S2mm,
     };
     Some((name.core, direction))
 }
@@ -332,12 +333,14 @@ fn channel_of(error: &Error) -> Option<(usize, Direction)> {
 /// When the accelerator detects a fault, its channel may be ahead by the content of the FIFOs.
 fn locates_fault(cell: &Cell, error: &Error) -> bool {
     let Some((core, direction)) = cell.channel() else { return true };
-    let same_way = |way| (way == zynq_pgs::Direction::S2mm) == (direction == Direction::S2mm);
+    let same_way =
+        |way| (way == zynq_pgs::diagnosis::Direction::S2mm) == (direction == Direction::S2mm);
     let states = error.diagnosis().map(|diagnosis| &diagnosis.channels);
     let state = states.and_then(|states| {
         states.iter().find(|s| s.channel.core == core && same_way(s.channel.direction))
     });
-    let at_phase = |state: &zynq_pgs::ChannelState| state.phase.name() == cell.phase_text();
+    let at_phase =
+        |state: &zynq_pgs::diagnosis::ChannelState| state.phase.name() == cell.phase_text();
     match cell.kind {
         FaultKind::Stall => state.is_some_and(|state| state.bytes_moved < state.bytes_expected),
         FaultKind::DmaIntErr

@@ -7,7 +7,7 @@ use bitstream_model::interface::address_map::{
 };
 use serde_json::{Value, json};
 use zynq_pgs::platform::{FpgaManager, NodePart, System, UnreadableNode, try_node, try_u_dma_buf};
-use zynq_pgs::{PlatformError, UioNode};
+use zynq_pgs::platform::{PlatformError, UioNode};
 
 /// An error with its causes and next step, in one line.
 pub(super) fn explained(error: &PlatformError) -> String {
@@ -49,7 +49,7 @@ impl Node {
 
     pub(super) fn to_json(&self) -> Value {
         let UioNode { device, name, maps, .. } = &self.node;
-        let map = |map: &zynq_pgs::UioMap| json!({ "name": map.name, "address": map.address, "bytes": map.bytes });
+        let map = |map: &zynq_pgs::platform::UioMap| json!({ "name": map.name, "address": map.address, "bytes": map.bytes });
         let maps: Vec<Value> = maps.iter().map(map).collect();
         let value_of = |option| match &self.uses {
             Some((found, value)) if *found == option => Some(value),

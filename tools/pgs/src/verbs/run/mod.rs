@@ -13,7 +13,8 @@ use std::io::{self, Write};
 use clap::Args;
 use scene::Scene;
 use serde_json::Value;
-use zynq_pgs::{BoardKind, Capabilities, ContactMemory, StepParameters, StepReport};
+use zynq_pgs::board::BoardKind;
+use zynq_pgs::{Capabilities, ContactMemory, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};

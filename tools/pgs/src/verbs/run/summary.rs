@@ -8,8 +8,9 @@ use pgs_thesis::estimate::thesis::{self, recorded};
 use pgs_thesis::estimate::{Records, StepCycles};
 use scene::{Scene, moving_mass, penetration};
 use serde_json::{Value, json};
+use zynq_pgs::StepParameters;
 use zynq_pgs::interface::profile::Profile;
-use zynq_pgs::{Limit, StepParameters};
+use zynq_pgs::report::Limit;
 
 use super::row::Row;
 use pgs_command::numbers::grouped;

@@ -34,7 +34,7 @@ pub(super) fn step(
     let mut given = Vec::with_capacity(collisions.len());
     for (index, collision) in collisions.iter().enumerate() {
         let about = |number| format!("collision {index}: {number} is beyond the words");
-        let mut contacts = [[0.0; 4]; zynq_pgs::CONTACT_POINTS];
+        let mut contacts = [[0.0; 4]; zynq_pgs::scene::CONTACT_POINTS];
         for (to, contact) in contacts.iter_mut().zip(&collision.contacts) {
             let [x, y, z] = contact.point;
             *to = words_in(format, [x, y, z, contact.distance]).map_err(about)?;
