@@ -40,8 +40,8 @@
 //! # }
 //! ```
 //!
-//! - Bodies and collisions may be arrays of structures, separate arrays ([`BodyArrays`],
-//!   [`CollisionArrays`]), or the caller's own storage ([`Bodies`], [`Collisions`]).
+//! - Bodies and collisions may be arrays of structures, separate arrays ([`BodyArrays`](scene::BodyArrays),
+//!   [`CollisionArrays`](scene::CollisionArrays)), or the caller's own storage ([`Bodies`], [`Collisions`]).
 //! - [`Accelerator::step`] is [`Accelerator::submit`] and [`InFlight::wait`] in one call. A step that is
 //!   dropped, by a panic too, is stopped.
 //! - [`InFlight::detach`] lets a step go on without a borrow of its accelerator, for callers that own it.

@@ -1,8 +1,8 @@
 //! Refuses bad input before anything is sent.
 //!
-//! [`validate`] makes one pass over the bodies and one over the collisions. A board of the same
-//! capacities accepts every step that passes. Packing screens its input block by block ([`Quick`])
-//! and calls [`validate`] only for the error of a block that it refuses.
+//! `validate` makes one pass over the bodies and one over the collisions. A board of the same
+//! capacities accepts every step that passes. Packing screens its input block by block (`Quick`)
+//! and calls `validate` only for the error of a block that it refuses.
 
 mod body;
 pub(crate) mod capable_profiles;
