@@ -33,7 +33,8 @@ impl CollisionPacker {
     }
 
     /// Packs the records of all collisions over the bitstream's channels; returns the sum of their
-    /// words, modulo 2^32, or `None` if there are more bodies than a stream of sixteen bits has indices for.
+    /// words, modulo 2^32, or `None` if there are more bodies than a stream of sixteen bits has
+    /// indices for.
     pub fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &B,
@@ -98,8 +99,9 @@ impl StepPacker {
     }
 
     /// Writes the records of all collisions of the bodies that were packed last, unchecked; returns
-    /// the sum of their words, modulo 2^32, or `None` as [`CollisionPacker::pack`] does, or if no bodies were
-    /// packed. `added` is how many the order added that was made for them, `None` if there is none.
+    /// the sum of their words, modulo 2^32, or `None` as [`CollisionPacker::pack`] does, or if no
+    /// bodies were packed. `added` is how many the order added that was made for them, `None` if
+    /// there is none.
     pub fn pack_collisions<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,

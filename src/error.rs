@@ -23,9 +23,12 @@ pub enum Error {
     Open(#[from] OpenError),
     /// A step failed; the caller's bodies are as they were.
     #[error("{}", match aftermath {
-        Aftermath::Ready => "the step failed and changed nothing; the board was reset and is ready for the next",
-        Aftermath::Untouched => "the step was refused and changed nothing; the board is ready for the next",
-        Aftermath::MustReopen => "the step failed and changed nothing; the board could not be reset: open it again",
+        Aftermath::Ready => "the step failed and changed nothing; the board was reset and is \
+                             ready for the next",
+        Aftermath::Untouched => "the step was refused and changed nothing; the board is ready for \
+                                 the next",
+        Aftermath::MustReopen => "the step failed and changed nothing; the board could not be \
+                                  reset: open it again",
     })]
     Step {
         /// The cause.
@@ -40,12 +43,12 @@ pub enum Error {
     /// An earlier fault could not be cleared.
     #[error("the board was given up after an earlier fault: open it again")]
     MustReopen,
-    /// The call came from another process than the one that opened the accelerator: from a child that
-    /// was forked since. No register was touched. A child that drops the accelerator frees memory of
-    /// its own alone.
+    /// The call came from another process than the one that opened the accelerator: from a child
+    /// that was forked since. No register was touched. A child that drops the accelerator frees
+    /// memory of its own alone.
     #[error(
-        "the accelerator belongs to process {opener}, which opened it, and this is a process forked \
-         from it: open a board after the fork, in the process that uses it"
+        "the accelerator belongs to process {opener}, which opened it, and this is a process \
+         forked from it: open a board after the fork, in the process that uses it"
     )]
     OtherProcess {
         /// Number of the process that opened it.

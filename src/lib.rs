@@ -40,11 +40,13 @@
 //! # }
 //! ```
 //!
-//! - Bodies and collisions may be arrays of structures, separate arrays ([`BodyArrays`](scene::BodyArrays),
-//!   [`CollisionArrays`](scene::CollisionArrays)), or the caller's own storage ([`Bodies`], [`Collisions`]).
-//! - [`Accelerator::step`] is [`Accelerator::submit`] and [`InFlight::wait`] in one call. A step that is
-//!   dropped, by a panic too, is stopped.
-//! - [`InFlight::detach`] lets a step go on without a borrow of its accelerator, for callers that own it.
+//! - Bodies and collisions may be arrays of structures, separate arrays
+//!   ([`BodyArrays`](scene::BodyArrays), [`CollisionArrays`](scene::CollisionArrays)), or the
+//!   caller's own storage ([`Bodies`], [`Collisions`]).
+//! - [`Accelerator::step`] is [`Accelerator::submit`] and [`InFlight::wait`] in one call. A step
+//!   that is dropped, by a panic too, is stopped.
+//! - [`InFlight::detach`] lets a step go on without a borrow of its accelerator, for callers that
+//!   own it.
 //! - [`InFlight::prepare`] packs another world's step while the board works, and
 //!   [`InFlight::wait_and_start`] starts it the moment that the board is free.
 //! - [`Accelerator::write`] takes each collision as the narrow phase finds it.
@@ -53,12 +55,12 @@
 //!
 //! # The floating-point environment
 //!
-//! The caller's thread may round in another mode than to nearest, flush subnormal numbers to zero, or
-//! trap on exceptions. No result depends on it, and nothing traps, on x86-64 and on `AArch64`: the driver
-//! and the emulated board compute in the standard environment and restore the caller's, exception flags
-//! too. They call the methods of [`Bodies`] and [`Collisions`] in the standard environment. The narrow
-//! phase that `write` runs stays in the caller's environment; [`Writer::push`] sets the standard one
-//! where it computes. `docs/library.md` lists the calls.
+//! The caller's thread may round in another mode than to nearest, flush subnormal numbers to zero,
+//! or trap on exceptions. No result depends on it, and nothing traps, on x86-64 and on `AArch64`:
+//! the driver and the emulated board compute in the standard environment and restore the caller's,
+//! exception flags too. They call the methods of [`Bodies`] and [`Collisions`] in the standard
+//! environment. The narrow phase that `write` runs stays in the caller's environment;
+//! [`Writer::push`] sets the standard one where it computes. `docs/library.md` lists the calls.
 //!
 //! # When something fails
 //!

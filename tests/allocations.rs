@@ -159,7 +159,8 @@ fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
     }
 }
 
-/// On the reference board: its short cuts share impulses out among threads by lists that they make anew.
+/// On the reference board: its short cuts share impulses out among threads by lists that they make
+/// anew.
 #[test]
 fn steps_with_impulses_allocate_nothing_either() {
     let out = StepParameters::default().with_impulses_out(true);

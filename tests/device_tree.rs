@@ -1,6 +1,6 @@
 //! Tests that the device trees agree with the interface: regions, sizes, names, interrupt, clock,
-//! ports. Buffers lie in the one segment that every DMA core reaches. The udev rule names every node and gives
-//! rights to its group alone.
+//! ports. Buffers lie in the one segment that every DMA core reaches. The udev rule names every
+//! node and gives rights to its group alone.
 
 #[path = "device_tree/mod.rs"]
 mod device_tree;
@@ -234,8 +234,8 @@ fn labelled(tree: &Tree, label: &str) -> String {
     tree.strings("/__symbols__", label).expect("a label").concat()
 }
 
-/// The tree reserves the segment that the numbers for the Vivado script give to every DMA master, the
-/// constants are the same, and the guard begins where it ends.
+/// The tree reserves the segment that the numbers for the Vivado script give to every DMA master,
+/// the constants are the same, and the guard begins where it ends.
 #[test]
 fn the_tree_the_constants_and_the_script_have_one_segment_and_a_guard_behind_it() {
     let fence = Fence::default();

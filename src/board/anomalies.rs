@@ -32,7 +32,8 @@ impl Anomaly {
             }
             Self::NoHalt => "a channel did not stop in time; the board was reset before the step",
             Self::LateStatus => {
-                "an interrupt came before the status of the descriptors was in memory; waiting for it"
+                "an interrupt came before the status of the descriptors was in memory; waiting \
+                 for it"
             }
         }
     }

@@ -39,7 +39,8 @@ pub(crate) struct Plan {
     pub(crate) passes: Passes,
     /// Profile and formats: they decide how records lie on the channels.
     pub(crate) variant: Variant,
-    /// Whether the velocity records bring the inverse masses, because the shapes do not fit the table.
+    /// Whether the velocity records bring the inverse masses, because the shapes do not fit the
+    /// table.
     pub(crate) streamed_masses: bool,
 }
 

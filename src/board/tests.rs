@@ -91,7 +91,11 @@ fn a_real_board_is_identified_and_never_replaced_by_an_emulated_one() {
         // The control block in the file identifies itself; the DMA cores stay in reset.
         let error = error_of(&choice, &system);
         assert!(
-            matches!(&error, OpenError::Core(DmaError::State { channel, .. }) if channel.to_string() == "dma0 MM2S"),
+            matches!(
+                &error,
+                OpenError::Core(DmaError::State { channel, .. })
+                    if channel.to_string() == "dma0 MM2S"
+            ),
             "{error}"
         );
     }

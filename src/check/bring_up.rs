@@ -276,8 +276,8 @@ fn length(
     if !(LENGTH_WIDTH_MIN..=LENGTH_WIDTH_MAX).contains(&narrowest) {
         // Nothing can be transferred with this width, and the other lines would tell nothing.
         let next = format!(
-            "an AXI DMA has {LENGTH_WIDTH_MIN} to {LENGTH_WIDTH_MAX} bits: check whether the region \
-             is that of one"
+            "an AXI DMA has {LENGTH_WIDTH_MIN} to {LENGTH_WIDTH_MAX} bits: check whether the \
+             region is that of one"
         );
         let expected = format!("{expected} bits, {source}");
         lines.stop(Line::Length, Outcome::failed(found, expected, next));
@@ -352,7 +352,10 @@ mod tests {
         let lines = lines.finish();
         assert_eq!(lines[1].outcome, Outcome::ok("2.0"));
         assert!(
-            matches!(&lines[2].outcome, Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503")
+            matches!(
+                &lines[2].outcome,
+                Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503"
+            )
         );
         assert!(matches!(&lines[3].outcome, Outcome::Skipped { .. }));
     }

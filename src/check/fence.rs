@@ -59,7 +59,8 @@ pub(super) fn fence(accelerator: &mut Accelerator) -> Outcome {
     }
     if open.is_empty() {
         return Outcome::ok(format!(
-            "{fence} holds {masters} masters: each met a decode error in the {bytes} bytes at {at:#x}"
+            "{fence} holds {masters} masters: each met a decode error in the {bytes} bytes at \
+             {at:#x}"
         ));
     }
     Outcome::failed(

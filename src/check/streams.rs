@@ -80,8 +80,8 @@ fn step_failed(error: &Error) -> Outcome {
             ),
             fault => (
                 chain(fault),
-                "check whether the addresses of the buffers are mapped for the channel in the block \
-                 design, and whether streams are exchanged",
+                "check whether the addresses of the buffers are mapped for the channel in the \
+                 block design, and whether streams are exchanged",
             ),
         },
         error => (chain(error), "load the bitstream again"),

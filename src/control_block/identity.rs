@@ -70,12 +70,14 @@ impl Capabilities {
         Reach { address_width: self.address_width, fence: self.fence }
     }
 
-    /// Whether the masses of that many shapes are streamed with the bodies: the table has no room for them.
+    /// Whether the masses of that many shapes are streamed with the bodies: the table has no room
+    /// for them.
     pub(crate) const fn streams_masses(&self, shapes: usize) -> bool {
         self.variant.has_streamed_masses() && shapes > self.shape_capacity as usize
     }
 
-    /// The largest number of shapes. Where each body can bring its inverse mass, the table does not limit it.
+    /// The largest number of shapes. Where each body can bring its inverse mass, the table does not
+    /// limit it.
     #[must_use]
     pub const fn shapes_max(&self) -> u32 {
         if self.variant.has_streamed_masses() { u32::MAX } else { self.shape_capacity }
@@ -349,7 +351,8 @@ mod tests {
         assert_eq!(identify_with(&[]).expect("well formed").fence, None);
         let found = identify_with(&[(0x150, 0x5000), (0x154, 0x400)]).expect("well formed");
         assert_eq!(found.fence, Fence::new(0x5000_0000, 64 << 20));
-        // The base alone is no fence; a fence at another place than a multiple of its length neither.
+        // The base alone is no fence; a fence at another place than a multiple of its length
+        // neither.
         assert_eq!(identify_with(&[(0x150, 0x5000)]).expect("well formed").fence, None);
         let error = identify_with(&[(0x150, 0x5001), (0x154, 0x400)]).expect_err("misplaced");
         assert!(error.to_string().starts_with("FENCE_SIZE is 0x00000400"), "{error}");

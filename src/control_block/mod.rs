@@ -30,7 +30,8 @@ pub enum ControlError {
     Gone,
     /// The reset did not end in time.
     #[error(
-        "the accelerator was expected to be out of reset within {limit:?}, RESET reads {found:#010x}"
+        "the accelerator was expected to be out of reset within {limit:?}, RESET reads \
+         {found:#010x}"
     )]
     Reset {
         /// The time limit.

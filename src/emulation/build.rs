@@ -40,8 +40,9 @@ pub struct Build {
 }
 
 impl Build {
-    /// The configuration of the described board. [`EmulatedBoard::new`](bitstream_model::EmulatedBoard::new)
-    /// refuses options that contradict each other.
+    /// The configuration of the described board.
+    /// [`EmulatedBoard::new`](bitstream_model::EmulatedBoard::new) refuses options that contradict
+    /// each other.
     #[must_use]
     pub fn config(&self) -> BoardConfig {
         let default = BoardConfig::default();

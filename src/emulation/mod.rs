@@ -29,8 +29,8 @@
 //! | `threads` | threads of this machine for the board's arithmetic; no result depends on them | one per processor, at most 4 |
 //! | `lanes` | compute in SIMD lanes, `on` or `off`; no result depends on it | `on` |
 //!
-//! [`OpenOptions::emulated`](crate::OpenOptions::emulated) opens such a board. Its builder's handle,
-//! which tells violations and injects faults, is in [`model`](crate::model):
+//! [`OpenOptions::emulated`](crate::OpenOptions::emulated) opens such a board. Its builder's
+//! handle, which tells violations and injects faults, is in [`model`](crate::model):
 //!
 //! ```
 //! use zynq_pgs::model::EmulatedBoard;

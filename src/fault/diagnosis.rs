@@ -90,7 +90,8 @@ impl fmt::Display for ChannelState {
         match &self.descriptor {
             Some(DescriptorState { index, address, bytes, status }) => write!(
                 f,
-                ", descriptor {} of {descriptors} ({bytes} bytes, at {address:#x}, status {status})",
+                ", descriptor {} of {descriptors} ({bytes} bytes, at {address:#x}, status \
+                 {status})",
                 index + 1
             )?,
             None => write!(f, ", all {descriptors} descriptors complete")?,

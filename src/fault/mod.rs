@@ -38,8 +38,8 @@ pub enum Fault {
     Accelerator(Box<AcceleratorError>),
     /// An awaited event did not come in time.
     #[error(
-        "{awaited} did not come within {limit:?}, in {phase}{}: give the step a longer deadline, or \
-         look at what the streams wait for", behind_text(*behind)
+        "{awaited} did not come within {limit:?}, in {phase}{}: give the step a longer deadline, \
+         or look at what the streams wait for", behind_text(*behind)
     )]
     Deadline {
         /// The event.
@@ -69,8 +69,8 @@ pub enum Fault {
     },
     /// A result is not a number.
     #[error(
-        "the result of body {body} is not finite: the scene diverges (shorten the time step), or the \
-         accelerator computes wrongly"
+        "the result of body {body} is not finite: the scene diverges (shorten the time step), or \
+         the accelerator computes wrongly"
     )]
     NotFinite {
         /// The first such body.
@@ -78,8 +78,8 @@ pub enum Fault {
     },
     /// An impulse that came out is not a number.
     #[error(
-        "the impulses of collision {collision} are not finite: the scene diverges (shorten the time \
-         step), or the accelerator computes wrongly"
+        "the impulses of collision {collision} are not finite: the scene diverges (shorten the \
+         time step), or the accelerator computes wrongly"
     )]
     ImpulseNotFinite {
         /// The first such collision.
@@ -87,7 +87,8 @@ pub enum Fault {
     },
     /// Registers read all ones.
     #[error(
-        "{region} reads all ones: is the bitstream still loaded, its power on and its clock running?"
+        "{region} reads all ones: is the bitstream still loaded, its power on and its clock \
+         running?"
     )]
     Gone {
         /// The register region.

@@ -21,8 +21,8 @@ impl Checker {
     }
 
     /// Verifies that every collision is in the schedule exactly once, and that no moving body is
-    /// used twice within the window. A collision without contact points may be left out, and uses no
-    /// body.
+    /// used twice within the window. A collision without contact points may be left out, and uses
+    /// no body.
     ///
     /// # Errors
     /// [`OrderError`]: the input cannot be ordered, or the first entry at which the schedule is

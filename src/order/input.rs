@@ -20,8 +20,8 @@ pub struct OrderInput<'a> {
 impl OrderInput<'_> {
     /// The pair of a collision without contact points. No body has such an index.
     ///
-    /// [`Order::AsGiven`](super::Order::AsGiven) leaves its entry empty, every other order leaves it
-    /// out.
+    /// [`Order::AsGiven`](super::Order::AsGiven) leaves its entry empty, every other order leaves
+    /// it out.
     pub const EMPTY: [u32; 2] = [u32::MAX; 2];
 
     /// Whether a collision has contact points.
@@ -115,7 +115,8 @@ impl InputBuffers {
             if collision.is_empty() {
                 return OrderInput::EMPTY;
             }
-            // A pair of `u32::MAX` would look like `EMPTY`: B becomes one less, and the error names A.
+            // A pair of `u32::MAX` would look like `EMPTY`: B becomes one less, and the error names
+            // A.
             let Collision { body_a, body_b, .. } = collision;
             [body_a, body_b.min(u32::MAX - u32::from(body_a == u32::MAX))]
         }));

@@ -112,8 +112,8 @@ impl Orderer {
     /// Such a pipeline waits by itself, and the order has no empty entries. A body with many
     /// collisions makes both orders wait about as long. The order as given is therefore taken
     /// unless the other one saves more than one cycle in a hundred, and wherever there is no window
-    /// to order for. Neither order has collisions without contact points. Time and memory are linear
-    /// in the input.
+    /// to order for. Neither order has collisions without contact points. Time and memory are
+    /// linear in the input.
     ///
     /// # Errors
     /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with

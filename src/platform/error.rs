@@ -40,9 +40,9 @@ pub enum PlatformError {
     },
     /// Memory lies outside the segment that the bitstream confines its DMA cores to.
     #[error(
-        "{bytes} bytes at {address:#x} of the memory {region:?} lie outside the fence {fence} of the \
-         bitstream, where no DMA core reaches them: reserve the memory of the fence in the device \
-         tree, or build the bitstream for this memory with `rtlgen generate --memory`"
+        "{bytes} bytes at {address:#x} of the memory {region:?} lie outside the fence {fence} of \
+         the bitstream, where no DMA core reaches them: reserve the memory of the fence in the \
+         device tree, or build the bitstream for this memory with `rtlgen generate --memory`"
     )]
     OutsideFence {
         /// The memory: a UIO node, a u-dma-buf, or a file.
@@ -66,7 +66,8 @@ pub enum PlatformError {
     },
     /// A register region is too short.
     #[error(
-        "register region {region} has {found} bytes, at least {expected} are needed: is this the device tree of the bitstream?"
+        "register region {region} has {found} bytes, at least {expected} are needed: is this the \
+         device tree of the bitstream?"
     )]
     ShortRegion {
         /// Name of the region.
@@ -97,7 +98,8 @@ pub enum PlatformError {
     },
     /// There is no such UIO node.
     #[error(
-        "no UIO node named {wanted:?} (found: {}): is the overlay loaded? see device-tree/README.md",
+        "no UIO node named {wanted:?} (found: {}): is the overlay loaded? see \
+         device-tree/README.md",
         if found.is_empty() { "none" } else { found }
     )]
     NoNode {
@@ -148,8 +150,8 @@ pub enum PlatformError {
     },
     /// A plain file lies in the place of a device file.
     #[error(
-        "{} is a plain file of {found} bytes, expected a device with at least {expected}: remove it, \
-         and let udev make the device file (udevadm trigger)",
+        "{} is a plain file of {found} bytes, expected a device with at least {expected}: remove \
+         it, and let udev make the device file (udevadm trigger)",
         path.display()
     )]
     NotADevice {
@@ -213,8 +215,8 @@ pub enum PlatformError {
     },
     /// The kernel took the logic away while it was open.
     #[error(
-        "{why} while it was open: no register is touched any more; load the bitstream and its overlay \
-         again if need be, then open the board again"
+        "{why} while it was open: no register is touched any more; load the bitstream and its \
+         overlay again if need be, then open the board again"
     )]
     Lost {
         /// The part that went away, in words.
@@ -354,8 +356,9 @@ pub enum PlatformError {
     },
     /// Another user holds the lock of a device file.
     #[error(
-        "{} is locked: another program, or another accelerator of this one, uses it; end that first, or \
-         share it: one accelerator steps several worlds in turn (docs/library.md, Two worlds on one board)",
+        "{} is locked: another program, or another accelerator of this one, uses it; end that \
+         first, or share it: one accelerator steps several worlds in turn (docs/library.md, Two \
+         worlds on one board)",
         path.display()
     )]
     Busy {
@@ -371,7 +374,8 @@ pub enum PlatformError {
         map: String,
     },
     /// A property of the device tree has an unusable value.
-    #[error("expected {expected} in {}, found {found:02x?}: correct the device tree", path.display())]
+    #[error("expected {expected} in {}, found {found:02x?}: correct the device \
+             tree", path.display())]
     DeviceTree {
         /// Which property.
         path: PathBuf,
@@ -444,8 +448,8 @@ pub enum PlatformError {
     },
     /// Another driver has the served board.
     #[error(
-        "the board served at {} has another driver: end that first, or share it: one accelerator steps \
-         several worlds in turn (docs/library.md, Two worlds on one board)",
+        "the board served at {} has another driver: end that first, or share it: one accelerator \
+         steps several worlds in turn (docs/library.md, Two worlds on one board)",
         socket.display()
     )]
     ServerBusy {

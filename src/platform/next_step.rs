@@ -29,8 +29,8 @@ impl PlatformError {
                 Some(format!("name the one that programs this logic {MANAGER}"))
             }
             Self::OtherManagers { .. } => Some(format!(
-                "if one of them programs this logic, name it {MANAGER}; if the logic is known to be \
-                 programmed, --manager none"
+                "if one of them programs this logic, name it {MANAGER}; if the logic is known to \
+                 be programmed, --manager none"
             )),
             Self::DevMemRefused { source, .. } => Some(of_dev_mem(source)),
             Self::NoMaintenance { path, source } => Some(of_maintenance(path, source)),
@@ -50,12 +50,14 @@ fn of_state(state: &str) -> String {
     match state {
         // A bitstream that was loaded past the kernel does not change this state.
         "unknown" | "power off" | "power up" => {
-            "load a bitstream, for example with `pgs load`; if one was loaded past the kernel, as by \
-             JTAG, say so with --manager none (`OpenOptions::manager`): an access to logic that is \
-             not programmed hangs the processor"
+            "load a bitstream, for example with `pgs load`; if one was loaded past the kernel, as \
+             by JTAG, say so with --manager none (`OpenOptions::manager`): an access to logic \
+             that is not programmed hangs the processor"
         }
-        _ => "the last attempt to load has failed, or is not over: see dmesg | tail, then load again \
-              with `pgs load`",
+        _ => {
+            "the last attempt to load has failed, or is not over: see dmesg | tail, then load \
+              again with `pgs load`"
+        }
     }
     .to_owned()
 }

@@ -1,8 +1,8 @@
 //! Bodies, and the trait that makes a caller's own arrays bodies.
 //!
-//! A step reads bodies and writes them back through [`Bodies`]. Slices, arrays and vectors of [`Body`]
-//! implement it, [`BodyArrays`] implements it over separate arrays, and an engine with a layout of its
-//! own implements its two methods: nothing is copied in between.
+//! A step reads bodies and writes them back through [`Bodies`]. Slices, arrays and vectors of
+//! [`Body`] implement it, [`BodyArrays`] implements it over separate arrays, and an engine with a
+//! layout of its own implements its two methods: nothing is copied in between.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -24,9 +24,9 @@ pub struct Contact {
 /// Two bodies in contact at one to four points, or a place without contacts.
 ///
 /// A collision of count 0 is empty: it affects no body, whatever the order and the bitstream, and
-/// keeps its index, so that the collisions behind it keep theirs. Nothing of it is looked at but the
-/// count: its bodies need not exist or differ, its numbers need not be finite. It counts like any
-/// other against the number of collisions that a bitstream takes.
+/// keeps its index, so that the collisions behind it keep theirs. Nothing of it is looked at but
+/// the count: its bodies need not exist or differ, its numbers need not be finite. It counts like
+/// any other against the number of collisions that a bitstream takes.
 ///
 /// Either body may be A, as long as the normal points from B to A and the contact points lie on B.
 /// One of them may be static. All points share the normal: a manifold with several normals, such as
@@ -42,8 +42,8 @@ pub struct Collision {
     pub body_b: u32,
     /// Unit normal, world frame, pointing from B to A: the direction in which A is pushed.
     pub normal: [f32; 3],
-    /// Number of contact points, 0 to [`CONTACT_POINTS`], and the friction of the pair, if it has one
-    /// of its own: [`with_friction`](Self::with_friction) puts it above the number.
+    /// Number of contact points, 0 to [`CONTACT_POINTS`], and the friction of the pair, if it has
+    /// one of its own: [`with_friction`](Self::with_friction) puts it above the number.
     pub count: u32,
     /// The contact points; the elements behind their number are ignored.
     pub contacts: [Contact; CONTACT_POINTS],

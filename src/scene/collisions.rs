@@ -6,8 +6,8 @@ use crate::simd::prefetch;
 /// The collisions of a step, in the caller's own layout.
 ///
 /// Slices, arrays and vectors of [`Collision`] implement it, [`CollisionArrays`] implements it over
-/// separate arrays, and so does a reference to any of them. The solver takes the collisions in the order of
-/// [`StepParameters::order`](crate::StepParameters::order).
+/// separate arrays, and so does a reference to any of them. The solver takes the collisions in the
+/// order of [`StepParameters::order`](crate::StepParameters::order).
 ///
 /// Several threads may call it at the same time, each for collisions of its own
 /// ([`OpenOptions::pack_threads`]); a container must therefore be [`Sync`]. Its methods run in the
@@ -143,8 +143,8 @@ pub struct CollisionArrays<'a> {
     pub bodies: &'a [[u32; 2]],
     /// Unit normals from B to A.
     pub normals: &'a [[f32; 3]],
-    /// Numbers of contact points; 0 for an empty collision. The friction of a pair is above its number,
-    /// as in [`Collision::count`].
+    /// Numbers of contact points; 0 for an empty collision. The friction of a pair is above its
+    /// number, as in [`Collision::count`].
     pub counts: &'a [u32],
     /// Contact points: x, y, z on B's surface, and signed distance, m.
     pub contacts: &'a [[[f32; 4]; CONTACT_POINTS]],

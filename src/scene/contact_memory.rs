@@ -1,4 +1,5 @@
-//! Carries impulses from one step to the next for callers whose contacts have no memory of their own.
+//! Carries impulses from one step to the next for callers whose contacts have no memory of their
+//! own.
 
 use super::impulses::Impulses;
 use super::{CONTACT_POINTS, Collision, Collisions, Contact};
@@ -11,7 +12,8 @@ use crate::scene::tangents::tangents;
 /// contacts better, and needs no such memory.
 ///
 /// ```
-/// # use zynq_pgs::{Accelerator, Body, Collision, Contact, Error, OpenOptions, Pose, Shape, Velocity};
+/// # use zynq_pgs::{Accelerator, Body, Collision, Contact, Error, OpenOptions};
+/// # use zynq_pgs::{Pose, Shape, Velocity};
 /// use zynq_pgs::{ContactMemory, StepParameters, WarmCollisions};
 ///
 /// # fn main() -> Result<(), Error> {
@@ -56,14 +58,15 @@ struct Kept {
 }
 
 impl ContactMemory {
-    /// A memory without contacts. A contact that has moved by more than `reach` metres is a new one.
+    /// A memory without contacts. A contact that has moved by more than `reach` metres is a new
+    /// one.
     #[must_use]
     pub const fn new(reach: f32) -> Self {
         Self { reach, kept: Vec::new() }
     }
 
-    /// Takes the collisions of a step and the impulses that came out of it, in place of the ones of the
-    /// step before. Collisions beyond the end of `impulses` are forgotten.
+    /// Takes the collisions of a step and the impulses that came out of it, in place of the ones of
+    /// the step before. Collisions beyond the end of `impulses` are forgotten.
     pub fn remember<C: Collisions + ?Sized>(&mut self, collisions: &C, impulses: &[Impulses]) {
         self.kept.clear();
         for (index, impulses) in (0..collisions.len()).zip(impulses) {
@@ -77,8 +80,8 @@ impl ContactMemory {
         self.kept.sort_by_key(|kept| kept.pair);
     }
 
-    /// The impulses with which the collisions of the next step begin: the ones that it remembers, times
-    /// `factor`.
+    /// The impulses with which the collisions of the next step begin: the ones that it remembers,
+    /// times `factor`.
     #[must_use]
     pub fn recall<C: Collisions + ?Sized>(&self, collisions: &C, factor: f32) -> Vec<Impulses> {
         let mut left: Vec<Left> = self.kept.iter().map(Left::of).collect();

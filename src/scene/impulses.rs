@@ -14,8 +14,9 @@ use super::{CONTACT_POINTS, Collision};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Impulses {
-    /// Along the normal, at each contact point. Positive pushes body A along the normal. The elements
-    /// behind the number of points are 0 where they come out, and ignored where they go in.
+    /// Along the normal, at each contact point. Positive pushes body A along the normal. The
+    /// elements behind the number of points are 0 where they come out, and ignored where they go
+    /// in.
     pub normal: [f32; CONTACT_POINTS],
     /// Along the two tangents of the collision (specification, §7), at the centre of its points.
     pub friction: [f32; 2],

@@ -105,8 +105,8 @@ pub struct StepParameters {
     /// Friction coefficient of every contact, unless collisions have their own.
     pub friction: f32,
     /// Whether each collision has a friction of its own
-    /// ([`Collision::with_friction`](crate::Collision::with_friction)). A collision without one then
-    /// has a friction of 0.
+    /// ([`Collision::with_friction`](crate::Collision::with_friction)). A collision without one
+    /// then has a friction of 0.
     pub pair_friction: bool,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
@@ -135,12 +135,12 @@ pub struct StepParameters {
     /// a body are no hazard, whatever their number. Without it a static body must be at rest.
     pub kinematic: bool,
     /// Whether the step begins with the [impulses](crate::Collisions::impulses) that come with the
-    /// collisions, in place of none: piles and towers then need fewer passes. Each kind of pass with
-    /// iterations takes one more pass in front of the others, which applies the impulses.
+    /// collisions, in place of none: piles and towers then need fewer passes. Each kind of pass
+    /// with iterations takes one more pass in front of the others, which applies the impulses.
     pub warm_start: bool,
     /// Whether the impulses of the step come out
-    /// ([`Accelerator::impulses`](crate::Accelerator::impulses)), for the next step's warm start, for
-    /// sounds or for damage. They cost no pass.
+    /// ([`Accelerator::impulses`](crate::Accelerator::impulses)), for the next step's warm start,
+    /// for sounds or for damage. They cost no pass.
     pub impulses_out: bool,
     /// Order in which the collisions are sent; `None` is the cheapest order on the board at hand:
     ///
@@ -222,7 +222,8 @@ impl StepParameters {
     }
 
     /// Sets the share of the penetration that a step removes ([`Self::position_coefficient`]), from
-    /// 0 to 1; the time step in seconds, where distances are [velocities](Self#a-distance-as-a-velocity).
+    /// 0 to 1; the time step in seconds, where distances are
+    /// [velocities](Self#a-distance-as-a-velocity).
     #[must_use]
     pub const fn with_position_coefficient(self, position_coefficient: f32) -> Self {
         Self { position_coefficient, ..self }
@@ -296,7 +297,8 @@ impl StepParameters {
         Self { impulses_out, ..self }
     }
 
-    /// Sets the [order](Self::order) of the collisions; `None` is the cheapest on the board at hand.
+    /// Sets the [order](Self::order) of the collisions; `None` is the cheapest on the board at
+    /// hand.
     #[must_use]
     pub fn with_order(self, order: impl Into<Option<Order>>) -> Self {
         Self { order: order.into(), ..self }

@@ -6,8 +6,8 @@ use thiserror::Error;
 /// The error of a shape that has no mass properties.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and inertia \
-     stay in the range of f32: correct it"
+    "the {parameter} of a shape is {found:e}, expected a number above 0 with which mass and \
+     inertia stay in the range of f32: correct it"
 )]
 #[non_exhaustive]
 pub struct ShapeError {

@@ -1,7 +1,7 @@
 //! The tangents along which friction acts.
 
-/// The two tangents of a collision with this unit normal, as the accelerator makes them: the directions
-/// of [`Impulses::friction`](crate::Impulses::friction).
+/// The two tangents of a collision with this unit normal, as the accelerator makes them: the
+/// directions of [`Impulses::friction`](crate::Impulses::friction).
 ///
 /// Source: interface specification, §7, `tangents(q)` with q = -n.
 #[must_use]

@@ -27,8 +27,8 @@ pub(crate) fn find(options: &OpenOptions) -> Result<Found, OpenError> {
 
 /// An open accelerator.
 ///
-/// Dropping it stops the DMA channels and frees their memory. It belongs to the process that opened it:
-/// in a forked child its calls are refused, and dropping it frees memory of the child alone.
+/// Dropping it stops the DMA channels and frees their memory. It belongs to the process that opened
+/// it: in a forked child its calls are refused, and dropping it frees memory of the child alone.
 pub struct Accelerator {
     board: BoardDescription,
     pub(super) device: Device,
@@ -121,14 +121,14 @@ impl Accelerator {
     }
 
     /// Loads the shapes that bodies refer to by index, in place of all earlier ones. The
-    /// bitstream's table limits their number. A bitstream of world inertia with streamed masses takes any
-    /// number: each body then brings its own mass. A step that
+    /// bitstream's table limits their number. A bitstream of world inertia with streamed masses
+    /// takes any number: each body then brings its own mass. A step that
     /// was [prepared](super::InFlight::prepare) with the earlier shapes is refused from now on.
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
-    /// stay. [`Error::Step`]: the board went away. [`Error::MustReopen`] after a fault that could not
-    /// be cleared.
+    /// stay. [`Error::Step`]: the board went away. [`Error::MustReopen`] after a fault that could
+    /// not be cleared.
     pub fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Error> {
         standard(|| {
             self.settle()?;
@@ -150,8 +150,8 @@ impl Accelerator {
     }
 
     /// The impulses of each collision, in the caller's order, of the last step that succeeded and
-    /// [gave them out](crate::StepParameters::impulses_out); empty before the first. An empty collision has
-    /// zeros.
+    /// [gave them out](crate::StepParameters::impulses_out); empty before the first. An empty
+    /// collision has zeros.
     #[must_use]
     pub fn impulses(&self) -> &[Impulses] {
         &self.impulses.committed

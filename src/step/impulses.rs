@@ -16,8 +16,8 @@ pub(super) struct ImpulsesOut {
 
 impl ImpulsesOut {
     /// Reads the impulses from the beats in front of the results. `collision_of` tells the caller's
-    /// collision of an entry, of `given` ones. Returns the sum of the words, and the first collision
-    /// whose impulses are not finite.
+    /// collision of an entry, of `given` ones. Returns the sum of the words, and the first
+    /// collision whose impulses are not finite.
     pub(super) fn read(
         &mut self,
         plan: &Plan,

@@ -95,7 +95,8 @@ impl InFlight<'_> {
         })
     }
 
-    /// Hands the buffers of a newly packed step over to the device, while this step is on the board.
+    /// Hands the buffers of a newly packed step over to the device, while this step is on the
+    /// board.
     pub(super) fn hand_over(&mut self, mut step: PackedStep) -> Result<Prepared, Error> {
         let (accelerator, bank) = (&mut *self.accelerator, step.bank);
         let mut watch = Stopwatch::start();

@@ -40,8 +40,8 @@ pub(super) fn check_received(
     Ok(())
 }
 
-/// Reads the results of a bank into `staged`. Compares the driver's sum of the words, with `before` for
-/// the impulses, with `expected`, the accelerator's sum of the words that it sent.
+/// Reads the results of a bank into `staged`. Compares the driver's sum of the words, with `before`
+/// for the impulses, with `expected`, the accelerator's sum of the words that it sent.
 pub(super) fn read<B: Bodies + ?Sized>(
     device: &mut Device,
     staged: &mut Vec<Record>,
@@ -96,8 +96,8 @@ impl Results<'_> {
     /// Reads the results of `count` bodies in their order. Returns the sum of the words, and the
     /// first body that is not finite.
     ///
-    /// A static body at rest does not move, whatever comes back for it: `statics` are the indices of
-    /// these bodies, ascending.
+    /// A static body at rest does not move, whatever comes back for it: `statics` are the indices
+    /// of these bodies, ascending.
     pub(crate) fn read_in_order<B: Bodies + ?Sized>(
         self,
         count: usize,

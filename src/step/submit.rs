@@ -31,8 +31,8 @@ impl Accelerator {
     /// # Errors
     /// [`Error::Input`]: the input was refused and nothing was sent. [`Error::Step`]: a fault of
     /// the board; [`Error::may_retry`] and [`Error::must_reopen`] say what to do.
-    /// [`Error::MustReopen`] after a fault that could not be cleared. [`Error::OtherProcess`] in a child
-    /// that was forked since the opening; so of every call.
+    /// [`Error::MustReopen`] after a fault that could not be cleared. [`Error::OtherProcess`] in a
+    /// child that was forked since the opening; so of every call.
     pub fn step<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         bodies: &mut B,

@@ -10,8 +10,8 @@ use pgs_interface::number::StreamFormat;
 pub enum Excess {
     /// The records of the bitstream do not hold what the step asks for.
     #[error(
-        "the step asks for {asked}, which the records of this bitstream do not hold: do without, or \
-         load another"
+        "the step asks for {asked}, which the records of this bitstream do not hold: do without, \
+         or load another"
     )]
     NotInRecords {
         /// What was asked for.
@@ -43,8 +43,8 @@ pub enum Excess {
     /// Bodies and collisions together exceed the on-chip memory.
     #[error(
         "{bodies} bodies and {collisions} collisions need {needed} bytes of on-chip memory, there \
-         are {available}: with so many bodies at most {fitting} collisions fit; give fewer, or load \
-         another bitstream"
+         are {available}: with so many bodies at most {fitting} collisions fit; give fewer, or \
+         load another bitstream"
     )]
     MemoryExceeded {
         /// Bodies given.
@@ -65,8 +65,8 @@ pub enum Excess {
 
     /// The inertia of a shape differs between its axes.
     #[error(
-        "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes with \
-         three equal components (cube, sphere): give such a shape, or load another"
+        "shape {shape}: its inverse inertia is {found:?}, but this bitstream takes only shapes \
+         with three equal components (cube, sphere): give such a shape, or load another"
     )]
     Anisotropic {
         /// The shape.
@@ -158,8 +158,9 @@ impl fmt::Display for OutOfRange {
             ),
             InputItem::Rows(collision, contact) => write!(
                 f,
-                "{}: {field}[{component}] is {found}, but this bitstream computes constraint rows in \
-                 {format}, which takes {smallest:e} to {largest}: bring it into range, or load another",
+                "{}: {field}[{component}] is {found}, but this bitstream computes constraint rows \
+                 in {format}, which takes {smallest:e} to {largest}: bring it into range, or load \
+                 another",
                 of(collision, contact)
             ),
             InputItem::Shape(shape) => write!(

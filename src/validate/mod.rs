@@ -487,8 +487,8 @@ pub(crate) mod tests {
         assert_eq!(of(&refused), Some((InputItem::Body(1), 2)), "{refused}");
     }
 
-    /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them, and
-    /// no other profile is built for the shape.
+    /// 300,000 collisions, and a shape with three different inertias: `float` has no room for them,
+    /// and no other profile is built for the shape.
     #[test]
     fn shapes_are_refused_with_the_profiles_that_have_room_for_the_scene() {
         let shapes = [

@@ -199,9 +199,9 @@ mod tests {
         assert_eq!(check(&parameters, &FLOAT), Ok(()));
         assert_eq!(
             check(&parameters, &HALF),
-            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes 0, or \
-                 5.9604645e-8 to 65504: correct the step parameters, or load another (profiles that \
-                 could: naive, float)"
+            Err("the gravity in z is -7e4, but this bitstream computes in binary16, which takes \
+                 0, or 5.9604645e-8 to 65504: correct the step parameters, or load another \
+                 (profiles that could: naive, float)"
                 .to_owned())
         );
         // The reciprocal of 10 us is 100,000.

@@ -1,5 +1,6 @@
 //! Solves a step directly, from the formulae of the specification alone: one collision after the
-//! other, in f32, every operation rounded on its own. It shares no code with the driver or the board.
+//! other, in f32, every operation rounded on its own. It shares no code with the driver or the
+//! board.
 //!
 //! Sources: `bitstream-model/README.md`, arithmetic; Bullet's `b3Matrix3x3::setRotation` for the
 //! rotation matrix.
@@ -134,8 +135,8 @@ fn tangents(n: Vec3) -> [Vec3; 2] {
     }
 }
 
-/// A pass over one collision. With the impulses that a step begins with, these take the place of the
-/// computed ones.
+/// A pass over one collision. With the impulses that a step begins with, these take the place of
+/// the computed ones.
 type Pass =
     fn(&Collision, &mut Moving, &mut Moving, &mut Impulses, Option<&Impulses>, &StepParameters);
 

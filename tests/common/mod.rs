@@ -1,4 +1,5 @@
-//! Shares the parts of whole-step tests: opening a board, scenes, choosing an order, comparing bits.
+//! Shares the parts of whole-step tests: opening a board, scenes, choosing an order, comparing
+//! bits.
 #![allow(dead_code, reason = "each test uses its part")]
 
 pub(crate) mod direct;
@@ -45,8 +46,8 @@ pub(crate) fn standing([body_a, body_b]: [u32; 2], x: f32, y: f32, distance: f32
     Collision { body_a, body_b, normal: [0.0, -1.0, 0.0], count: 4, contacts }
 }
 
-/// Cubes in a row, `pitch` apart, each 1 cm deep in the static ground; `velocity` gives the velocity
-/// of the cube at `x`.
+/// Cubes in a row, `pitch` apart, each 1 cm deep in the static ground; `velocity` gives the
+/// velocity of the cube at `x`.
 pub(crate) fn row(
     cubes: u16,
     pitch: f32,

@@ -1,5 +1,5 @@
-//! Compares what a step can ask for beside the plain solver with the direct solver, bit for bit: the
-//! spin damping, static bodies that move, frictions of pairs, streamed masses.
+//! Compares what a step can ask for beside the plain solver with the direct solver, bit for bit:
+//! the spin damping, static bodies that move, frictions of pairs, streamed masses.
 #![cfg(feature = "emulation")]
 
 use crate::common::direct::direct_step;

@@ -1,6 +1,7 @@
 //! Tests that a step that names no order gets the cheapest one on the board at hand.
 //!
-//! `cargo test -p zynq-pgs --test it cheapest_order:: -- --nocapture` prints the cycles of each order.
+//! `cargo test -p zynq-pgs --test it cheapest_order:: -- --nocapture` prints the cycles of each
+//! order.
 #![cfg(feature = "emulation")]
 #![allow(clippy::print_stdout, reason = "the figures are the output of the test")]
 

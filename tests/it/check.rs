@@ -121,8 +121,8 @@ fn the_fence_of_every_profile_is_proven_master_by_master() {
             assert!(report.passed(), "{report:#?}");
             let masters = 3 * profile.mm2s_widths.len();
             let expected = format!(
-                "0x50000000+64M holds {masters} masters: each met a decode error in the 65536 bytes at \
-                 0x54000000"
+                "0x50000000+64M holds {masters} masters: each met a decode error in the 65536 \
+                 bytes at 0x54000000"
             );
             assert_eq!(detail(&report, "fence"), expected, "{}", profile.name);
         }

@@ -1,5 +1,5 @@
-//! Tests that an accelerator belongs to the process that opened it: a forked child is refused, frees
-//! memory of its own alone, and disturbs neither its parent's board nor a step on it.
+//! Tests that an accelerator belongs to the process that opened it: a forked child is refused,
+//! frees memory of its own alone, and disturbs neither its parent's board nor a step on it.
 #![cfg(feature = "emulation")]
 
 use bitstream_model::interface::address_map::MEMORY_BASE;
@@ -48,8 +48,8 @@ fn all_refused(accelerator: &mut Accelerator, parent: u32) -> bool {
     shapes && stepped && submitted && written && bits(&bodies) == bits(&scene().0)
 }
 
-/// Both boards of a process: an emulated one, whose threads a child does not have, and a served one,
-/// whose socket and lock a child shares.
+/// Both boards of a process: an emulated one, whose threads a child does not have, and a served
+/// one, whose socket and lock a child shares.
 fn each_board(test: impl Fn(&mut dyn FnMut() -> Accelerator, &bitstream_model::EmulatedBoard)) {
     let config = BoardConfig { threads: 2, ..BoardConfig::default() };
     let (board, accelerator) = open_with(config, Some(2), &SHAPES);

@@ -1,7 +1,7 @@
 //! Tests of the driver through its public interface.
 //!
-//! One program, as each more would be linked with all of the crate. A test that counts the allocations of
-//! its whole process is a program of its own, beside this folder.
+//! One program, as each more would be linked with all of the crate. A test that counts the
+//! allocations of its whole process is a program of its own, beside this folder.
 
 #[cfg(feature = "emulation")]
 #[path = "../common/mod.rs"]

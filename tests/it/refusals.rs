@@ -203,8 +203,8 @@ fn what_is_wrong_at_one_look_alone_is_never_sent() {
             let mut wrongs =
                 vec![Collision { count: 5, ..right }, Collision { body_b: right.body_a, ..right }];
             if order != Order::AsGiven {
-                // Empty ones, which the order would have left out. The second one equals the padding
-                // that fills a gap in an order.
+                // Empty ones, which the order would have left out. The second one equals the
+                // padding that fills a gap in an order.
                 wrongs.push(Collision { count: 0, ..right });
                 wrongs.push(Collision { count: 0, body_b: right.body_a, ..right });
             }

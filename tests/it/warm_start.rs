@@ -230,7 +230,8 @@ fn short_world() -> (Vec<Body>, Vec<Collision>) {
         body.velocity.angular = body.velocity.angular.map(short);
     }
     for collision in &mut collisions {
-        // A third of a sum is rounded, and the rounding of relative points differs from that of absolute ones.
+        // A third of a sum is rounded, and the rounding of relative points differs from that of
+        // absolute ones.
         if collision.count == 3 {
             collision.count = 4;
         }

@@ -145,7 +145,8 @@ fn give<const ROWS: usize, const N: usize>(
     Some(())
 }
 
-/// The velocity record of a body with its inertia, and with its inverse mass where masses are streamed.
+/// The velocity record of a body with its inertia, and with its inverse mass where masses are
+/// streamed.
 #[inline(always)]
 fn world_velocity(
     body: &Body,

@@ -168,7 +168,8 @@ impl<'a, 'b> CollisionPacker<'a, 'b> {
         self
     }
 
-    /// Writes the next collisions. Their number is divisible by [`BLOCK`], except for the last ones.
+    /// Writes the next collisions. Their number is divisible by [`BLOCK`], except for the last
+    /// ones.
     pub(crate) fn write(&mut self, collisions: Contiguous<'_>) -> Seen {
         self.write_lying(collisions)
     }

@@ -1,6 +1,6 @@
-//! Writes the collision segments of the warm passes for the channel that carries impulses. A segment
-//! repeats, issue by issue, the collision beats of the channel, and adds a beat of impulses to each
-//! issue.
+//! Writes the collision segments of the warm passes for the channel that carries impulses. A
+//! segment repeats, issue by issue, the collision beats of the channel, and adds a beat of impulses
+//! to each issue.
 //!
 //! The other channels have the same beats in every pass.
 
@@ -55,10 +55,11 @@ impl WarmSums {
     }
 }
 
-/// Writes the collisions of both warm passes. The records of the other passes are written already: the
-/// sum of the words tells whether the caller's collisions are still the same.
+/// Writes the collisions of both warm passes. The records of the other passes are written already:
+/// the sum of the words tells whether the caller's collisions are still the same.
 ///
-/// Shape: the layout of [`Segment::WarmCollisions`] gives the number of beats of a segment on this channel.
+/// Shape: the layout of [`Segment::WarmCollisions`] gives the number of beats of a segment on this
+/// channel.
 pub(crate) fn pack_warm<C: Collisions + ?Sized>(
     variant: &Variant,
     channel: usize,

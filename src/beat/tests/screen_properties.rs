@@ -171,7 +171,11 @@ proptest! {
         places in [any_vec3(), any_vec3(), any_vec3()],
         shapes in [0..3_u32, 0..3_u32, 1..5_u32],
         mut collision in any_collision(),
-        pair in prop_oneof![20 => [0..3_u32, 0..3_u32], 1 => [0..4_u32, 0..4_u32], 1 => any::<[u32; 2]>()],
+        pair in prop_oneof![
+            20 => [0..3_u32, 0..3_u32],
+            1 => [0..4_u32, 0..4_u32],
+            1 => any::<[u32; 2]>()
+        ],
         wrong in prop::option::of((0..4_usize, 0..4_usize, any_f32(), any::<u32>())),
     ) {
         let bodies: Vec<Body> = places

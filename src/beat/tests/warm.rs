@@ -47,7 +47,12 @@ fn body(index: u16) -> Body {
 }
 
 fn any_number() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => -9.0_f32..9.0, 1 => -65_504.0_f32..65_504.0, 1 => -1e-6_f32..1e-6, 1 => Just(-0.0)]
+    prop_oneof![
+        4 => -9.0_f32..9.0,
+        1 => -65_504.0_f32..65_504.0,
+        1 => -1e-6_f32..1e-6,
+        1 => Just(-0.0)
+    ]
 }
 
 prop_compose! {
@@ -63,7 +68,8 @@ prop_compose! {
         let contacts = points.map(contact);
         let [first, second, third, fourth, friction @ ..] = impulses;
         let normal = [first, second, third, fourth];
-        (Collision { body_a, body_b, normal: [x, y, z], count, contacts }, Impulses { normal, friction })
+        let collision = Collision { body_a, body_b, normal: [x, y, z], count, contacts };
+        (collision, Impulses { normal, friction })
     }
 }
 

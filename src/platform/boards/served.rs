@@ -1,8 +1,8 @@
 //! Drives a board in another process: registers, interrupt and time through a socket, memory for
 //! DMA in a file that comes through it, new for each driver.
 //!
-//! The board has one driver at a time, by its server's rule. The clock is the board's and virtual: it
-//! advances with each request, and each answer carries its time.
+//! The board has one driver at a time, by its server's rule. The clock is the board's and virtual:
+//! it advances with each request, and each answer carries its time.
 
 use std::fmt;
 use std::fs::File;
@@ -22,8 +22,8 @@ use crate::platform::{
     DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory,
 };
 
-/// Longest wait of one request, shorter than the protocol allows: a simulator of the accelerator needs
-/// ten seconds for a millisecond of the board's time.
+/// Longest wait of one request, shorter than the protocol allows: a simulator of the accelerator
+/// needs ten seconds for a millisecond of the board's time.
 const ONE_WAIT: Duration = Duration::from_millis(1);
 
 /// Longest real time for an answer, in which the board's process computes at most [`ONE_WAIT`] of
@@ -169,8 +169,8 @@ impl Line {
         self.exchange(request).map(|(answer, _)| answer)
     }
 
-    /// One request, its answer, and the files that come beside it. After the first failure the board
-    /// is lost for good.
+    /// One request, its answer, and the files that come beside it. After the first failure the
+    /// board is lost for good.
     fn exchange(&self, request: Request) -> Result<(Answer, Vec<File>), PlatformError> {
         let mut state = self.state();
         if state.lost.is_none() {
@@ -206,8 +206,8 @@ impl Line {
     }
 }
 
-/// Sends a request and reads its answer, and the files beside it. The whole answer must arrive within
-/// `limit`.
+/// Sends a request and reads its answer, and the files beside it. The whole answer must arrive
+/// within `limit`.
 fn exchange(
     stream: &mut UnixStream,
     request: Request,
@@ -389,7 +389,8 @@ mod tests {
         assert!(error.to_string().contains("says nothing within 20ms"), "{error}");
     }
 
-    /// What a driver says to a server that gives these answers, the second with these files beside it.
+    /// What a driver says to a server that gives these answers, the second with these files beside
+    /// it.
     fn refused(answers: [(Status, u32); 2], files: Vec<File>) -> PlatformError {
         let (_folder, socket, listener) = bound();
         let server = std::thread::spawn(move || {

@@ -4,7 +4,8 @@
 //! before the first access. The answer is the state of the logic's FPGA manager, which is known by
 //! its name: a board may have managers of other chips.
 //!
-//! Source: Linux `Documentation/ABI/testing/sysfs-class-fpga-manager`, `drivers/fpga/zynqmp-fpga.c`.
+//! Source: Linux `Documentation/ABI/testing/sysfs-class-fpga-manager`,
+//! `drivers/fpga/zynqmp-fpga.c`.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -62,8 +62,8 @@ impl LockedFile {
 }
 
 impl Drop for LockedFile {
-    /// Unlocks at once, although a forked child may still have the file open. In such a child, which
-    /// shares the lock, it only closes the file: the lock stays with the parent.
+    /// Unlocks at once, although a forked child may still have the file open. In such a child,
+    /// which shares the lock, it only closes the file: the lock stays with the parent.
     fn drop(&mut self) {
         if self.process.is_this() {
             // Closing the file unlocks it as well.
@@ -152,7 +152,8 @@ mod tests {
         assert_free(&other);
     }
 
-    /// The lock belongs to the opening, which a forked child shares: an unlock there would unlock here.
+    /// The lock belongs to the opening, which a forked child shares: an unlock there would unlock
+    /// here.
     #[test]
     fn a_forked_child_that_drops_a_lock_leaves_it_to_its_parent() {
         let (_root, path) = device();

@@ -24,8 +24,8 @@ const LONGEST: u64 = 1 << 40;
 ///
 /// Every access here relies on one invariant: a region has one owner, and under that owner no
 /// access to a word meets a store to the same word from another thread. The lock keeps other
-/// mappings of the device file away, also mappings of this process; a file that came to this process
-/// alone needs none. The owners do the rest: the
+/// mappings of the device file away, also mappings of this process; a file that came to this
+/// process alone needs none. The owners do the rest: the
 /// public types store through `&mut self`, the accelerator steps through `&mut self`, and the pool
 /// gives each piece of memory to one holder. The device's own accesses are not the language's
 /// concern: words and doublewords are volatile and aligned, and beats are handed over.

@@ -267,7 +267,10 @@ mod tests {
         let error = ReservedMemory::open_in(&system, "pgs-memory").expect_err("which end?");
         let (kernel, found) = (0x2000, Some(0x1000));
         assert!(
-            matches!(error, PlatformError::RegionLength { kernel: k, found: f, .. } if (k, f) == (kernel, found)),
+            matches!(
+                error,
+                PlatformError::RegionLength { kernel: k, found: f, .. } if (k, f) == (kernel, found)
+            ),
             "{error}"
         );
     }

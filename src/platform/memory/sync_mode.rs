@@ -101,7 +101,10 @@ mod tests {
             });
             let error = set_mode("pgs", root.path(), Caching::Cached, false).expect_err("not kept");
             assert!(
-                matches!(&error, PlatformError::SyncModeRefused { written: 2, found, .. } if found == kept),
+                matches!(
+                    &error,
+                    PlatformError::SyncModeRefused { written: 2, found, .. } if found == kept
+                ),
                 "{error}"
             );
             assert_eq!(driver.join().expect("no panic"), "2\n");

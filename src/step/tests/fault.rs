@@ -112,7 +112,10 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     tampered.after_wait(|rings| rings.change(receiver(1), 0, |status| status & !RXEOF));
     let error = failed(&tampered, &mut accelerator);
     assert!(
-        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::NoPacketEnd, at } if at.channel.core == 1)
+        matches!(
+            fault_of(&error),
+            Fault::Channel { cause: ChannelFault::NoPacketEnd, at } if at.channel.core == 1
+        )
     );
     recovered(&mut accelerator, &error);
 
@@ -122,7 +125,10 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     tampered.tamper(1, S2MM + DMASR, Tamper::Set(1 << 4));
     let error = failed(&tampered, &mut accelerator);
     assert!(
-        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::LongPacket, at } if at.channel.core == 1),
+        matches!(
+            fault_of(&error),
+            Fault::Channel { cause: ChannelFault::LongPacket, at } if at.channel.core == 1
+        ),
         "{error:?}"
     );
     recovered(&mut accelerator, &error);
@@ -134,7 +140,10 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
     tampered.after_wait(|rings| rings.change(receiver(2), 0, |_| 0));
     let error = failed(&tampered, &mut accelerator);
     assert!(
-        matches!(fault_of(&error), Fault::Channel { cause: ChannelFault::StatusMissing, at } if at.channel.core == 2)
+        matches!(
+            fault_of(&error),
+            Fault::Channel { cause: ChannelFault::StatusMissing, at } if at.channel.core == 2
+        )
     );
     recovered(&mut accelerator, &error);
 }

@@ -111,7 +111,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let window = IssueWindow::of(accelerator.capabilities())?;
     let order = options.order.name();
     println!(
-        "{grid} cubes dropped from {drop} m, {order}, depth {} issue slots, medians of {runs} runs in turn\n",
+        "{grid} cubes dropped from {drop} m, {order}, depth {} issue slots, medians of {runs} \
+         runs in turn\n",
         window.depth(),
     );
     println!(" step collisions  empty     order    verify      pack      pack   order");

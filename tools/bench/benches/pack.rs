@@ -62,7 +62,12 @@ struct Options {
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
     /// Threads that pack and unpack; several are compared with one, too
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u16).range(1..=64)
+    )]
     threads: u16,
     /// Measure the time of the running thread, not the wall time
     #[arg(long, conflicts_with = "threads")]

@@ -8,7 +8,12 @@ use zynq_pgs::order::Order;
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Common {
     /// Runs of each of the compared items, in turn; medians are shown
-    #[arg(long, value_name = "N", default_value_t = 11, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 11,
+        value_parser = clap::value_parser!(u16).range(1..)
+    )]
     runs: u16,
     /// cargo adds this option.
     #[arg(long, hide = true)]
@@ -33,7 +38,12 @@ pub struct Pile {
     #[arg(long, value_name = "H", default_value_t = 0.0)]
     pub drop: f32,
     /// Steps taken on the emulated board
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 5,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     pub steps: u32,
 }
 

@@ -31,8 +31,9 @@ pub struct StridedConst {
 /// frame.
 ///
 /// During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
-/// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with another
-/// of its arguments. Elements of several arrays may alternate, as those of an array of structures do.
+/// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with
+/// another of its arguments. Elements of several arrays may alternate, as those of an array of
+/// structures do.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyArrays {
@@ -54,7 +55,8 @@ pub struct BodyArrays {
 
 /// The collisions of a step, in the caller's own memory.
 ///
-/// During a call no thread writes them. A step refuses them where they share a byte with the bodies.
+/// During a call no thread writes them. A step refuses them where they share a byte with the
+/// bodies.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct CollisionArray {
@@ -64,7 +66,7 @@ pub struct CollisionArray {
     pub count: usize,
     /// The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     pub collisions: StridedConst,
-    /// The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each collision.
-    /// Null without a warm start.
+    /// The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each
+    /// collision. Null without a warm start.
     pub impulses: StridedConst,
 }

@@ -38,8 +38,8 @@ pub struct Collision {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C)]
 pub struct Impulses {
-    /// Along the normal, at each contact point; positive pushes body A along the normal. The elements
-    /// behind the number of points come out as 0 and are ignored where they go in.
+    /// Along the normal, at each contact point; positive pushes body A along the normal. The
+    /// elements behind the number of points come out as 0 and are ignored where they go in.
     pub normal: [f32; ZPGS_CONTACT_POINTS],
     /// Along the two tangents of the collision, at the centre of its points.
     pub friction: [f32; 2],

@@ -59,8 +59,8 @@ pub unsafe extern "C" fn zpgs_open(
     accelerator: *mut *mut AcceleratorHandle,
 ) -> Status {
     let open = || {
-        // SAFETY: `board` is null or ends with a null byte, and no thread writes it while `text` is in
-        // use: `# Safety` of this function.
+        // SAFETY: `board` is null or ends with a null byte, and no thread writes it while `text` is
+        // in use: `# Safety` of this function.
         let board = unsafe { memory::text(board, "text that names the board") }?;
         AcceleratorHandle::open(board)
     };
@@ -118,8 +118,8 @@ pub unsafe extern "C" fn zpgs_set_shapes(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `shapes` is null or leads to `count` initialised shapes that no thread writes during
-        // the call; a shape takes every bit pattern.
+        // SAFETY: `shapes` is null or leads to `count` initialised shapes that no thread writes
+        // during the call; a shape takes every bit pattern.
         let given = unsafe { memory::slice(shapes, count, "shapes") }?;
         let mut shapes = Vec::new();
         shapes.try_reserve_exact(given.len()).map_err(|error| {
@@ -150,8 +150,8 @@ pub unsafe extern "C" fn zpgs_parameters_default(
 }
 
 /// The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
-/// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite. A
-/// count of 0 stays 0.
+/// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite.
+/// A count of 0 stays 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn zpgs_count_with_friction(count: u32, friction: f32) -> u32 {
     count_with_friction(count, friction)
@@ -184,11 +184,12 @@ pub unsafe extern "C" fn zpgs_step(
             Span::of("zpgs_collisions", collisions),
             Span::of("zpgs_parameters", parameters),
         ];
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
-        // call alone uses the bodies, and no thread writes the others.
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
+        // call; this call alone uses the bodies, and no thread writes the others.
         let (mut bodies, collisions, parameters) =
             unsafe { read_input(bodies, collisions, parameters) }?;
-        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
+        // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         let inputs = structures.into_iter().chain(collisions.inputs());
         outputs_apart(&bodies, report.as_ref(), None, inputs)?;
@@ -214,8 +215,8 @@ pub unsafe extern "C" fn zpgs_submit(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
-        // call alone uses the bodies, and no thread writes the others.
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
+        // call; this call alone uses the bodies, and no thread writes the others.
         let (bodies, collisions, parameters) =
             unsafe { read_input(bodies, collisions, parameters) }?;
         state.submit(&bodies, &collisions, &parameters)
@@ -242,10 +243,11 @@ pub unsafe extern "C" fn zpgs_wait(
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
         let structure = [Span::of("zpgs_bodies", bodies)];
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
+        // call, and this call alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
-        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
+        // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
         outputs_apart(&bodies, report.as_ref(), None, structure.into_iter())?;
         let done = state.wait(&mut bodies)?;
@@ -254,13 +256,13 @@ pub unsafe extern "C" fn zpgs_wait(
     })
 }
 
-/// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-/// order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is the number
-/// of collisions of that step. For the warm start of the next step, sounds, damage.
+/// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in
+/// the order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is
+/// the number of collisions of that step. For the warm start of the next step, sounds, damage.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
-/// `zpgs_strided` describes, and no other thread uses its elements during the call.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is
+/// as `zpgs_strided` describes, and no other thread uses its elements during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_read_impulses(
     accelerator: *mut AcceleratorHandle,
@@ -274,8 +276,8 @@ pub unsafe extern "C" fn zpgs_read_impulses(
         let found = state.impulses();
         if found.len() != count {
             return Err(Failure::argument(format!(
-                "found {count} as the number of impulses, but the last step with impulses_out had {} \
-                 collisions: give that number",
+                "found {count} as the number of impulses, but the last step with impulses_out had \
+                 {} collisions: give that number",
                 found.len()
             )));
         }
@@ -294,13 +296,14 @@ pub unsafe extern "C" fn zpgs_read_impulses(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> Status {
     call(|| {
-        // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-        // returns: `# Safety` of this function.
+        // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this
+        // call returns: `# Safety` of this function.
         unsafe { memory::handle(accelerator) }?.cancel()
     })
 }
 
-/// Refuses a call whose outputs, the bodies among them, share bytes with each other or with its input.
+/// Refuses a call whose outputs, the bodies among them, share bytes with each other or with its
+/// input.
 pub(crate) fn outputs_apart(
     bodies: &BodiesView,
     report: Option<&Out<Report>>,
@@ -331,18 +334,20 @@ fn check_impulses(
 /// Reads and checks the input of a step.
 ///
 /// # Safety
-/// Each pointer is null or leads to its structure, with the size in it, whose arrays are as it describes.
+/// Each pointer is null or leads to its structure, with the size in it, whose arrays are as it
+/// describes.
 pub(crate) unsafe fn read_input<'a>(
     bodies: *const BodyArrays,
     collisions: *const CollisionArray,
     parameters: *const Parameters,
 ) -> Result<(BodiesView, CollisionsView<'a>, StepParameters), Failure> {
-    // SAFETY: the pointer is null or leads to the structure, whose arrays are as it describes: `# Safety`
-    // of this function.
+    // SAFETY: the pointer is null or leads to the structure, whose arrays are as it describes:
+    // `# Safety` of this function.
     let bodies = unsafe { read_bodies(bodies) }?;
     // SAFETY: as above.
     let collisions = unsafe { read_collisions(collisions) }?;
-    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this function.
+    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this
+    // function.
     let parameters = unsafe { read_parameters(parameters) }?;
     check_impulses(&collisions, &parameters)?;
     Ok((bodies, collisions, parameters))
@@ -355,7 +360,8 @@ pub(crate) unsafe fn read_input<'a>(
 pub(crate) unsafe fn read_parameters(
     pointer: *const Parameters,
 ) -> Result<StepParameters, Failure> {
-    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this function.
+    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this
+    // function.
     unsafe { memory::read(pointer, Parameters::default()) }?.driver()
 }
 

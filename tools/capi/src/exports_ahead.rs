@@ -12,8 +12,8 @@ use crate::report::Report;
 use crate::status::Status;
 
 /// Checks, orders and packs another step while one is in flight, in place of one that was prepared
-/// before. The arrays are the caller's again when the call returns; the step has their values of now,
-/// so that it cannot depend on the results of the step in flight.
+/// before. The arrays are the caller's again when the call returns; the step has their values of
+/// now, so that it cannot depend on the results of the step in flight.
 ///
 /// # Safety
 /// As `zpgs_step`.
@@ -28,8 +28,8 @@ pub unsafe extern "C" fn zpgs_prepare(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the call; this
-        // call alone uses the bodies, and no thread writes the others.
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
+        // call; this call alone uses the bodies, and no thread writes the others.
         let (bodies, collisions, parameters) =
             unsafe { read_input(bodies, collisions, parameters) }?;
         state.prepare(&bodies, &collisions, &parameters)
@@ -39,17 +39,17 @@ pub unsafe extern "C" fn zpgs_prepare(
 /// Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
 /// flight: the results are read while the board works on the next step.
 ///
-/// The status is that of the step that has ended. `started` gets the status of the start, and a step
-/// is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before: `zpgs_wait`
-/// ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started because the
-/// call was refused. `zpgs_last_error` has the text of the step that has ended or, if that is done, of
-/// the start.
+/// The status is that of the step that has ended. `started` gets the status of the start, and a
+/// step is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before:
+/// `zpgs_wait` ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started
+/// because the call was refused. `zpgs_last_error` has the text of the step that has ended or, if
+/// that is done, of the start.
 ///
 /// `report` may be null.
 ///
 /// # Safety
-/// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during the
-/// call.
+/// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during
+/// the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_wait_and_start(
     accelerator: *mut AcceleratorHandle,
@@ -63,10 +63,11 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
     let mut start_failed = None;
     let status = call_with(handle, |state| {
         let structure = [Span::of("zpgs_bodies", bodies)];
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
+        // call, and this call alone uses them.
         let bodies = unsafe { read_bodies(bodies) };
-        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone uses.
+        // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
+        // uses.
         let report = unsafe { Out::<Report>::optional(report) };
         if let (Ok(bodies), Ok(report)) = (&bodies, &report) {
             let started = Span::of("status of the start", started);

@@ -31,14 +31,14 @@ pub unsafe extern "C" fn zpgs_begin(accelerator: *mut AcceleratorHandle) -> Stat
 /// Appends `count` collisions to the list, all or none. The arrays are the caller's again when the
 /// call returns.
 ///
-/// A collision of count 0 keeps its place. `impulses` has the impulses that a step with `warm_start`
-/// begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null if no step of the
-/// list starts warm. `zpgs_end` checks the values of both.
+/// A collision of count 0 keeps its place. `impulses` has the impulses that a step with
+/// `warm_start` begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null
+/// if no step of the list starts warm. `zpgs_end` checks the values of both.
 ///
 /// # Safety
-/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions` is
-/// null or the address of `count` collisions, and `impulses` is null or that of `count` impulses; no
-/// thread writes them during the call.
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`
+/// is null or the address of `count` collisions, and `impulses` is null or that of `count`
+/// impulses; no thread writes them during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn zpgs_push(
     accelerator: *mut AcceleratorHandle,
@@ -50,13 +50,13 @@ pub unsafe extern "C" fn zpgs_push(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `collisions` is null or leads to `count` collisions that no thread writes; every bit
-        // pattern is one, and the driver's have the same layout.
+        // SAFETY: `collisions` is null or leads to `count` collisions that no thread writes; every
+        // bit pattern is one, and the driver's have the same layout.
         let collisions = unsafe { memory::slice(collisions.cast(), count, "collisions") }?;
         let impulses = match impulses.is_null() {
             true => None,
-            // SAFETY: `impulses` leads to `count` impulses that no thread writes; every bit pattern is
-            // one, and the driver's have the same layout.
+            // SAFETY: `impulses` leads to `count` impulses that no thread writes; every bit pattern
+            // is one, and the driver's have the same layout.
             false => Some(unsafe { memory::slice(impulses.cast(), count, "impulses") }?),
         };
         state.pushed().push(collisions, impulses)
@@ -66,8 +66,8 @@ pub unsafe extern "C" fn zpgs_push(
 /// Submits the step of the list, as `zpgs_submit`, and ends the list. The bodies are read now.
 /// `zpgs_wait` ends the step.
 ///
-/// A list that has ended takes no more collisions. It stays until the next `zpgs_begin`, so that its
-/// step can be submitted again, as after a fault. If the call fails the list is as before.
+/// A list that has ended takes no more collisions. It stays until the next `zpgs_begin`, so that
+/// its step can be submitted again, as after a fault. If the call fails the list is as before.
 ///
 /// # Safety
 /// As `zpgs_step`.
@@ -81,8 +81,8 @@ pub unsafe extern "C" fn zpgs_end(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the call,
-        // and this call alone uses them.
+        // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
+        // call, and this call alone uses them.
         let bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `parameters` is null or leads to a structure of the size in it.
         let parameters = unsafe { read_parameters(parameters) }?;

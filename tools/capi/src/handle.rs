@@ -49,8 +49,8 @@ impl AcceleratorHandle {
         Ok(Self { state, cancellation, text: Mutex::default(), process: Process::this() })
     }
 
-    /// Refuses a call in a child that was forked since the opening. It takes no lock: a thread of the
-    /// parent may have had it at the fork.
+    /// Refuses a call in a child that was forked since the opening. It takes no lock: a thread of
+    /// the parent may have had it at the fork.
     fn check_process(&self) -> Result<(), Failure> {
         match self.process.is_this() {
             true => Ok(()),

@@ -40,8 +40,8 @@ impl Order {
         known.ok_or_else(|| {
             Failure::argument(match removed() {
                 Some((_, name)) => format!(
-                    "found {number} as the order: {name} is no more, give the collisions in this order \
-                     and ZPGS_ORDER_AS_GIVEN"
+                    "found {number} as the order: {name} is no more, give the collisions in this \
+                     order and ZPGS_ORDER_AS_GIVEN"
                 ),
                 None => format!("found {number} as the order: give a value of zpgs_order"),
             })
@@ -100,7 +100,8 @@ pub struct Parameters {
     pub deadline_ms: u32,
     /// Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     pub retries: u32,
-    /// Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each kind.
+    /// Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each
+    /// kind.
     pub warm_start: u32,
     /// Flag: keep the impulses of the step for `zpgs_read_impulses`.
     pub impulses_out: u32,

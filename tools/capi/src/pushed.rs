@@ -1,8 +1,8 @@
 //! The collisions of a step that a narrow phase hands over one after the other.
 //!
-//! They stay in memory of the library until the step is submitted, in place of records on the way to
-//! the board: the cheapest order needs all collisions, and a step can be submitted once more after a
-//! fault.
+//! They stay in memory of the library until the step is submitted, in place of records on the way
+//! to the board: the cheapest order needs all collisions, and a step can be submitted once more
+//! after a fault.
 
 use zynq_pgs::{Collision, Impulses, WarmCollisions};
 

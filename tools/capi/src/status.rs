@@ -32,7 +32,8 @@ pub enum Status {
     /// The library met a mistake of its own: close the accelerator. Every later call with the same
     /// accelerator ends like this, too.
     Panic = 11,
-    /// The call came from a child that was forked since `zpgs_open`: the accelerator is its parent's, and
-    /// nothing was done. Open one after the fork. `zpgs_close` frees memory of the child alone.
+    /// The call came from a child that was forked since `zpgs_open`: the accelerator is its
+    /// parent's, and nothing was done. Open one after the fork. `zpgs_close` frees memory of the
+    /// child alone.
     Forked = 12,
 }

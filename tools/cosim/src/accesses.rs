@@ -1,5 +1,5 @@
-//! Random register accesses before, in and after a step: interrupt registers, arguments and START while
-//! the accelerator is busy, writes to read-only registers, a reset in the middle of a packet.
+//! Random register accesses before, in and after a step: interrupt registers, arguments and START
+//! while the accelerator is busy, writes to read-only registers, a reset in the middle of a packet.
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer};
 use pgs_interface::control::{
@@ -18,8 +18,8 @@ const AT_REST: u32 = 8;
 /// Most clocks of a step.
 const CLOCKS_MAX: u64 = 10_000_000;
 
-/// Makes the accesses of a seed; whether the step has ended. The accelerator is one in lock step with the
-/// model, which names the first difference.
+/// Makes the accesses of a seed; whether the step has ended. The accelerator is one in lock step
+/// with the model, which names the first difference.
 ///
 /// # Errors
 /// The difference, or an accelerator that does not answer.

@@ -1,4 +1,5 @@
-//! A step whose streams out are full for a while: the accelerator must stop, lose nothing and go on.
+//! A step whose streams out are full for a while: the accelerator must stop, lose nothing and go
+//! on.
 //!
 //! The step sends more impulses than all FIFOs behind the passes hold.
 
@@ -56,7 +57,8 @@ fn run(
     outcome::finish(accelerator, scene, feed)
 }
 
-/// The first step on which the hardware and the model differ, or on which one of them does not wait.
+/// The first step on which the hardware and the model differ, or on which one of them does not
+/// wait.
 ///
 /// # Errors
 /// An accelerator does not answer.

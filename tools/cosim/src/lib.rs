@@ -5,8 +5,8 @@
 //! scene (recorded or random) -> packets -> accelerator (RTL, model) -> outcome -> difference
 //! ```
 //!
-//! The packets are made here, by the specification, and not by the driver's packer: the bench shares no
-//! mistake with the driver.
+//! The packets are made here, by the specification, and not by the driver's packer: the bench
+//! shares no mistake with the driver.
 #![forbid(unsafe_code)]
 
 pub mod accesses;

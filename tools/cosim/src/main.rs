@@ -48,7 +48,8 @@ Examples:
   cosim registers --simulator target/rtl/pgs-rtl --cases 500
   cosim mutations                      builds a simulator for each: about a minute and a half each
 
-Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; 77 a
+Exit codes: 0 done; 1 a difference, or a mutation that nothing found; 2 wrong usage or an error; \
+77 a
 tool that the verb needs is not installed.";
 
 /// The behaviour of the hardware on a hazard.
@@ -413,8 +414,8 @@ fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<boo
     Ok(all_found)
 }
 
-/// Builds a simulator of these files; the first random step, or step with full streams, on which it and the
-/// model differ.
+/// Builds a simulator of these files; the first random step, or step with full streams, on which it
+/// and the model differ.
 fn difference_of(
     files: &[File],
     inertia: InertiaForm,

@@ -144,7 +144,8 @@ pub const MUTATIONS: &[Mutation] = &[
         inertia: Inertia::Isotropic,
         file: "core.v",
         right: "impulse_row   <= friction ? {64'd0, friction_impulses} :",
-        wrong: "impulse_row   <= friction ? {64'd0, friction_impulses[31:0], friction_impulses[63:32]} :",
+        wrong: "impulse_row   <= friction ? \
+                {64'd0, friction_impulses[31:0], friction_impulses[63:32]} :",
     },
     Mutation {
         name: "the impulses leave after every pass",

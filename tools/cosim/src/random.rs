@@ -161,8 +161,8 @@ impl Draw {
         }
     }
 
-    /// Inertias about world axes, any numbers. In two steps of three the bodies bring their masses, and nearly
-    /// always the same bodies are static as by their shapes.
+    /// Inertias about world axes, any numbers. In two steps of three the bodies bring their masses,
+    /// and nearly always the same bodies are static as by their shapes.
     fn world(&mut self, scene: &mut Scene) {
         scene.inertia = Inertia::World;
         scene.arguments.streamed_masses = !self.one_in(3);

@@ -25,8 +25,8 @@ pub struct Body {
     pub orientation: [u32; 4],
     /// Index of its shape.
     pub shape: u32,
-    /// Inverse inertia about world axes: xx, yy, zz, xy, xz, yz. On the streams with world inertia alone, as
-    /// the mass.
+    /// Inverse inertia about world axes: xx, yy, zz, xy, xz, yz. On the streams with world inertia
+    /// alone, as the mass.
     pub inverse_inertia: [u32; 6],
     /// The mass that it brings; means nothing in a step without streamed masses.
     pub inverse_mass: u32,
@@ -68,7 +68,8 @@ pub struct Arguments {
     pub impulses_out: bool,
     /// Whether each body brings its mass: with world inertia alone.
     pub streamed_masses: bool,
-    /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of f32.
+    /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of
+    /// f32.
     pub numbers: [u32; 6],
     /// Gravity.
     pub gravity: [u32; 3],

@@ -1,5 +1,5 @@
-//! Boards whose accelerator is another process or runs in lock step with the model. The model plays the
-//! hardware, with planted flaws: no simulator need be built.
+//! Boards whose accelerator is another process or runs in lock step with the model. The model plays
+//! the hardware, with planted flaws: no simulator need be built.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -44,8 +44,9 @@ fn program(folder: &Path, options: &str) -> PathBuf {
     let path = folder.join("simulator");
     let cosim = env!("CARGO_BIN_EXE_cosim");
     let text = format!("#!/bin/sh\nexec '{cosim}' model {options} \"$@\"\n");
-    // Another process writes the file. Written here, a child that another test starts at this moment
-    // would inherit the open file, and the kernel refuses to execute a file open for writing.
+    // Another process writes the file. Written here, a child that another test starts at this
+    // moment would inherit the open file, and the kernel refuses to execute a file open for
+    // writing.
     let writes = "printf %s \"$1\" > \"$0\" && chmod 755 \"$0\"";
     let written = Command::new("sh").args(["-c", writes]).arg(&path).arg(text).status();
     assert!(written.expect("a shell").success());
@@ -155,7 +156,8 @@ fn the_driver_steps_warm_on_an_accelerator_in_another_process() {
     assert_eq!(ends[0], ends[1]);
 }
 
-/// More shapes than the table has, each with another inertia about each axis: the masses are streamed.
+/// More shapes than the table has, each with another inertia about each axis: the masses are
+/// streamed.
 #[test]
 fn the_driver_streams_inertias_and_masses_to_an_accelerator_in_another_process() {
     let files = tempfile::tempdir().expect("a folder");

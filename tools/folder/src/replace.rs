@@ -5,8 +5,8 @@
 //! the earlier files get their names back. A process that is killed in between leaves temporary
 //! files (`.pgs-...`), and every name with either its earlier or its new content.
 //!
-//! A new file has the owner, the group and the mode of the earlier one, as far as the file system and the
-//! caller's rights allow it: a result is not lost because they cannot be set.
+//! A new file has the owner, the group and the mode of the earlier one, as far as the file system
+//! and the caller's rights allow it: a result is not lost because they cannot be set.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
@@ -181,8 +181,8 @@ fn keep(path: &Path) -> io::Result<PathBuf> {
     Ok(kept)
 }
 
-/// Gives a file the owner, the group and the mode of an earlier one. Where that cannot be, as on a FAT
-/// file system or without the rights, it keeps its own.
+/// Gives a file the owner, the group and the mode of an earlier one. Where that cannot be, as on a
+/// FAT file system or without the rights, it keeps its own.
 fn make_like(file: &File, earlier: &Metadata) {
     let found = file.metadata().map(|metadata| (metadata.uid(), metadata.gid())).ok();
     if found != Some((earlier.uid(), earlier.gid())) {
@@ -203,8 +203,8 @@ pub fn sync(file: &File) -> io::Result<()> {
     file.sync_all().or_else(|error| if is_lost(&error) { Err(error) } else { Ok(()) })
 }
 
-/// Whether an error of `fsync` says that data did not reach the disk. Every other one says that the file
-/// system, or a sandbox, has no such call.
+/// Whether an error of `fsync` says that data did not reach the disk. Every other one says that the
+/// file system, or a sandbox, has no such call.
 fn is_lost(error: &io::Error) -> bool {
     matches!(
         error.kind(),

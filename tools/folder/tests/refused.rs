@@ -1,4 +1,5 @@
-//! A file is replaced where a file system or a sandbox refuses to set its owner and mode, or to sync it.
+//! A file is replaced where a file system or a sandbox refuses to set its owner and mode, or to
+//! sync it.
 
 mod filter;
 

@@ -44,8 +44,8 @@ const WATCH_INTERVAL: Duration = Duration::from_millis(200);
 /// No execution.
 const NOTHING: u64 = u64::MAX;
 
-/// Runs a target. An execution beyond its time limit cannot be stopped: it ends the program, with the command
-/// that repeats it on stderr.
+/// Runs a target. An execution beyond its time limit cannot be stopped: it ends the program, with
+/// the command that repeats it on stderr.
 pub fn run(target: &Target, plan: &Plan) -> Summary {
     let start = Instant::now();
     let stop = AtomicBool::new(false);

@@ -15,7 +15,8 @@ use serde_json::{Value, json};
 /// Runs fuzz targets on inputs made from a seed: the same inputs on every machine and with every
 /// number of threads.
 ///
-/// A target that panics or hangs is a finding: the command that repeats it is printed, and the exit code is 1.
+/// A target that panics or hangs is a finding: the command that repeats it is printed, and the exit
+/// code is 1.
 ///
 /// Example: fuzz registers --executions 2000
 #[derive(Debug, Parser)]
@@ -98,7 +99,8 @@ fn act(args: &Args, out: &mut dyn Write) -> io::Result<ExitCode> {
 
 fn run(args: &Args, chosen: &[&'static Target], out: &mut dyn Write) -> io::Result<ExitCode> {
     let processors = || thread::available_parallelism().map_or(1, |count| count.get() as u64);
-    // Equal shares of time: a target that finds much a second and one that takes long are heard alike.
+    // Equal shares of time: a target that finds much a second and one that takes long are heard
+    // alike.
     let share = |seconds| Duration::from_secs(seconds).div_f64(chosen.len() as f64);
     let plan = Plan {
         first: args.first,

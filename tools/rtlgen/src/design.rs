@@ -23,10 +23,11 @@ pub struct Parameters {
     /// Registers behind the velocities and the impulses.
     pub output_stages: u32,
     /// Whether products and quotients round up to the smallest normal number, as the specification
-    /// says (section 7). A build without that rule gives a zero in some of these places: it is off the
-    /// specification.
+    /// says (section 7). A build without that rule gives a zero in some of these places: it is off
+    /// the specification.
     pub smallest_normal: bool,
-    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bit 1.
+    /// The form of the bodies' inertia. With world inertia the masses can be streamed: FEATURES bit
+    /// 1.
     pub inertia: Inertia,
     /// The one address segment of every DMA master in the block design, which `FENCE_BASE` and
     /// `FENCE_SIZE` report.
@@ -42,7 +43,8 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// The default choices with that form of inertia. World inertia takes more than twice the memory a body.
+    /// The default choices with that form of inertia. World inertia takes more than twice the
+    /// memory a body.
     #[must_use]
     pub fn with(inertia: Inertia) -> Self {
         let (bodies, collisions) = match inertia {
@@ -66,9 +68,9 @@ impl Parameters {
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{address_stages} registers in front of the memories and {output_stages} behind them give a read \
-     latency of {latency} cycles, expected an even number: a port reads in one cycle of a slot and \
-     writes in the other; add a register on either side"
+    "{address_stages} registers in front of the memories and {output_stages} behind them give a \
+     read latency of {latency} cycles, expected an even number: a port reads in one cycle of a \
+     slot and writes in the other; add a register on either side"
 )]
 pub struct OddReadLatency {
     address_stages: u32,
@@ -139,9 +141,10 @@ pub struct Design {
 /// the first issue that sees them: record registers, write registers.
 const AROUND_A_PASS: u32 = 8;
 
-/// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last body
-/// through the integration: set-up in front of the first pass (10), the end of the load (2), the entry
-/// into the integration (1), the result FIFOs and their end (5), the sums and the end (3).
+/// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last
+/// body through the integration: set-up in front of the first pass (10), the end of the load (2),
+/// the entry into the integration (1), the result FIFOs and their end (5), the sums and the end
+/// (3).
 const AROUND_A_STEP: u32 = 21;
 
 impl Design {
@@ -233,8 +236,8 @@ mod tests {
         assert!(error.to_string().contains("a read latency of 7 cycles"), "{error}");
     }
 
-    /// Nothing waits for the given impulses of a warm pass either: they pass the address registers of the
-    /// memory before a read of them does.
+    /// Nothing waits for the given impulses of a warm pass either: they pass the address registers
+    /// of the memory before a read of them does.
     #[test]
     fn the_given_impulses_are_written_before_a_pipeline_reads_them() {
         // The second cycle of the slot, and the register in front of the memory.

@@ -23,7 +23,8 @@ const EXAMPLES: &str = "\
 Examples:
   rtlgen generate --out rtl            the accelerator, as a folder of Verilog for a tool
   rtlgen generate --inertia world --out rtl-world    the same for boxes, capsules and any masses
-  rtlgen simulator --out rtl-sim       a simulator of it, for `pgs --accelerator rtl:rtl-sim/pgs-rtl`
+  rtlgen simulator --out rtl-sim       a simulator of it, for `pgs --accelerator \
+  rtl:rtl-sim/pgs-rtl`
   rtlgen schedule                      depths, units and delays of the pipelines
   rtlgen operators --vectors 1000000   the operators against an independent reference
   rtlgen sincos --all                  sine and cosine in fixed point against libm

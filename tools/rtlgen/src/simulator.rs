@@ -39,7 +39,8 @@ pub fn write(folder: &Path, files: &[File]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The device and the inode of a file that is there, and its path: equal for every link to the file.
+/// The device and the inode of a file that is there, and its path: equal for every link to the
+/// file.
 fn identity(path: PathBuf) -> Option<(u64, u64, PathBuf)> {
     let found = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?;
     Some((found.dev(), found.ino(), path))

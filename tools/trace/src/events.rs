@@ -1,7 +1,8 @@
 //! Writes a recorded step as trace events (the JSON of Chrome's tracing), for Perfetto.
 //!
-//! Two processes, because two clocks tell the time: the board's, modelled, and the host's. Both begin at
-//! 0; a place in one says nothing about the other. `docs/trace.schema.json` has the layout.
+//! Two processes, because two clocks tell the time: the board's, modelled, and the host's. Both
+//! begin at 0; a place in one says nothing about the other. `docs/trace.schema.json` has the
+//! layout.
 
 use std::io::{self, Write};
 
@@ -54,8 +55,9 @@ impl TracedStep<'_> {
             "clock_khz": self.recording.clock_khz,
             "first_clock": self.recording.span.begin,
             "clocks": format!(
-                "process {BOARD}: the emulated board's clock, modelled; process {HOST}: the clock of the \
-                 machine that emulates it, measured; both from 0, independently of each other"
+                "process {BOARD}: the emulated board's clock, modelled; process {HOST}: the clock \
+                 of the machine that emulates it, measured; both from 0, independently of each \
+                 other"
             ),
         });
         writeln!(
@@ -149,8 +151,8 @@ impl TracedStep<'_> {
         }
     }
 
-    /// The beats before the next packet, of a packet that began before the recording; returns the later
-    /// states.
+    /// The beats before the next packet, of a packet that began before the recording; returns the
+    /// later states.
     fn beats_outside<'a>(
         &self,
         thread: usize,

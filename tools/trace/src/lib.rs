@@ -1,9 +1,9 @@
 //! Writes the course of one step on an emulated board: as a VCD for `GTKWave`, as trace events for
 //! Perfetto, as a picture.
 //!
-//! The step was recorded by the board ([`recording`](bitstream_model::recording)). All three tell its
-//! time by the board's clock. The host's own times are on another clock: the trace events have a process
-//! of their own for them, the other two leave them out.
+//! The step was recorded by the board ([`recording`](bitstream_model::recording)). All three tell
+//! its time by the board's clock. The host's own times are on another clock: the trace events have
+//! a process of their own for them, the other two leave them out.
 
 mod a53;
 mod events;

@@ -66,7 +66,8 @@ impl Picture {
         // Writing to a string cannot fail.
         let _ = writeln!(
             self.0,
-            "<text class=\"{class}\" x=\"{x:.2}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>"
+            "<text class=\"{class}\" x=\"{x:.2}\" y=\"{y:.1}\" \
+             text-anchor=\"{anchor}\">{text}</text>"
         );
     }
 

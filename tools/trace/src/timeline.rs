@@ -1,8 +1,8 @@
 //! Draws a recorded step as lanes over time: CPU, channels, accelerator, interrupt.
 //!
-//! The board's part has the modelled clock. The CPU's part is an A53's on paper: the bytes of the step at
-//! the speed of memcpy on one core. No time of this machine is in it, so that the picture is the same on
-//! every machine.
+//! The board's part has the modelled clock. The CPU's part is an A53's on paper: the bytes of the
+//! step at the speed of memcpy on one core. No time of this machine is in it, so that the picture
+//! is the same on every machine.
 
 use std::io::{self, Write};
 
@@ -145,8 +145,8 @@ impl TracedStep<'_> {
         notes
     }
 
-    /// The clocks of the accelerator: of the whole step as its counters say, or of the stages that the
-    /// recording has.
+    /// The clocks of the accelerator: of the whole step as its counters say, or of the stages that
+    /// the recording has.
     fn work(&self) -> Option<String> {
         let stages = || self.recording.stages.iter();
         let [clocks, stalls, waits] = match self.report.map(|report| &report.cycles) {

@@ -1,7 +1,8 @@
 //! Writes a recorded step as a value change dump (IEEE 1364, clause 18), for `GTKWave`.
 //!
-//! Time counts from the begin of the recording, in picoseconds; each change stands at an edge of the
-//! accelerator's clock, which itself is left out. Names of registers and stages are ASCII in vectors.
+//! Time counts from the begin of the recording, in picoseconds; each change stands at an edge of
+//! the accelerator's clock, which itself is left out. Names of registers and stages are ASCII in
+//! vectors.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -182,7 +183,8 @@ impl TracedStep<'_> {
         writeln!(out, "$version zynq-pgs {} $end", env!("CARGO_PKG_VERSION"))?;
         writeln!(
             out,
-            "$comment {}: clock {} kHz, from clock {} on; clock = {} + time * {} / 10^9, rounded up $end",
+            "$comment {}: clock {} kHz, from clock {} on; clock = {} + time * {} / 10^9, rounded \
+             up $end",
             self.design,
             self.recording.clock_khz,
             self.recording.span.begin,
@@ -229,8 +231,8 @@ fn write_value(out: &mut dyn Write, signal: Signal, bits: &str) -> io::Result<()
     writeln!(out, "b{} {identifier}", if short.is_empty() { "0" } else { short })
 }
 
-/// The signals of a stream's port: a clock with TVALID and TREADY moves a beat, or on a stream of less
-/// than 128 bits a part of one.
+/// The signals of a stream's port: a clock with TVALID and TREADY moves a beat, or on a stream of
+/// less than 128 bits a part of one.
 fn stream_signals(dump: &mut Dump, channel: &ChannelRecording) {
     let [valid, ready, last] = ["tvalid", "tready", "tlast"].map(|name| dump.signal(name, 1));
     let [packets, descriptors] =

@@ -34,7 +34,8 @@ impl TooLarge {
 pub enum ViewError {
     /// The time of a frame.
     #[error(
-        "expected a finite time of step {step}, found {found}: give a shorter time step, or take fewer steps"
+        "expected a finite time of step {step}, found {found}: give a shorter time step, or take \
+         fewer steps"
     )]
     Time {
         /// The step.
@@ -44,8 +45,9 @@ pub enum ViewError {
     },
     /// The pose of a body.
     #[error(
-        "expected a finite pose of body {body} after step {step}, with an orientation that is not 0, found \
-         position {:?} and orientation {:?}: record the steps before it", pose.position, pose.orientation
+        "expected a finite pose of body {body} after step {step}, with an orientation that is not \
+         0, found position {:?} and orientation {:?}: record the steps before \
+         it", pose.position, pose.orientation
     )]
     Pose {
         /// The step.
@@ -60,7 +62,8 @@ pub enum ViewError {
     TooLarge(#[from] TooLarge),
     /// More kinds of bodies than a byte can tell apart.
     #[error(
-        "expected at most {most} kinds of bodies on a page, found {found}: record fewer bodies, or write them as glTF"
+        "expected at most {most} kinds of bodies on a page, found {found}: record fewer bodies, \
+         or write them as glTF"
     )]
     TooManyKinds {
         /// The kinds of the recording.
@@ -70,8 +73,8 @@ pub enum ViewError {
     },
     /// A hull of too few points.
     #[error(
-        "expected a geometry with a surface, found the {} of kind {kind} without one: give it four points \
-         or more that span a volume", geometry.name()
+        "expected a geometry with a surface, found the {} of kind {kind} without one: give it \
+         four points or more that span a volume", geometry.name()
     )]
     NoSurface {
         /// Its number among the kinds of bodies.
@@ -81,7 +84,8 @@ pub enum ViewError {
     },
     /// The size of a picture.
     #[error(
-        "expected a picture of 1 to {side} pixels a side and at most {pixels} in all, found {width} by {height}"
+        "expected a picture of 1 to {side} pixels a side and at most {pixels} in all, found \
+         {width} by {height}"
     )]
     Size {
         /// Pixels across.

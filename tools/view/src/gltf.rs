@@ -1,11 +1,14 @@
 //! Writes a recording as glTF 2.0: a node for each body, with an animation of its translation and
 //! rotation.
 //!
-//! Node 0 is the ground. Node k is the k-th moving body, which is body k where the ground is body 0.
-//! All bodies of one kind share a mesh, and all channels share the accessor of the times. The buffer has
-//! the times, the surfaces, and for each body its translations and its rotations in the order of time.
+//! Node 0 is the ground. Node k is the k-th moving body, which is body k where the ground is body
+//! 0. All bodies of one kind share a mesh, and all channels share the accessor of the times. The
+//!    buffer has
+//! the times, the surfaces, and for each body its translations and its rotations in the order of
+//! time.
 //!
-//! Source: Khronos Group, glTF 2.0 Specification, sections 3.6 (buffers), 3.11 (animations), 4.4 (GLB).
+//! Source: Khronos Group, glTF 2.0 Specification, sections 3.6 (buffers), 3.11 (animations), 4.4
+//! (GLB).
 
 use scene::GROUND_HALF_EXTENT;
 use serde::Serialize;

@@ -1,7 +1,8 @@
 //! The poses of a run as files: arrays, glTF, a page that plays them, and a picture of one moment.
 //!
-//! A [`Recording`] keeps the poses of the moving bodies at some steps. [`npz`], [`gltf`] and [`page`]
-//! turn it into the bytes of a file; [`picture`] draws bodies without one. Nothing here writes a file.
+//! A [`Recording`] keeps the poses of the moving bodies at some steps. [`npz`], [`gltf`] and
+//! [`page`] turn it into the bytes of a file; [`picture`] draws bodies without one. Nothing here
+//! writes a file.
 //!
 //! The bits of every result are the same on every machine: arithmetic is written out, angles come
 //! from `libm`, and the compressors work on integers.

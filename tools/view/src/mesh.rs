@@ -52,7 +52,8 @@ impl Mesh {
         (!mesh.faces.is_empty()).then_some(mesh)
     }
 
-    /// Adds a corner; returns its index. The largest mesh has a few hundred corners, which 16 bits count.
+    /// Adds a corner; returns its index. The largest mesh has a few hundred corners, which 16 bits
+    /// count.
     fn corner(&mut self, position: [f32; 3], normal: [f32; 3]) -> u16 {
         self.positions.push(position);
         self.normals.push(normal);

@@ -2,13 +2,13 @@
 //!
 //! A position is a whole number of quanta from the lowest corner of all positions. A quaternion
 //! is its three smallest components and the index of the largest. A speed is the distance
-//! from the last frame over the time between: 0 below [`SLOWEST`], otherwise the root of its share of
-//! the largest speed. The page's `decode.js` undoes each step.
+//! from the last frame over the time between: 0 below [`SLOWEST`], otherwise the root of its share
+//! of the largest speed. The page's `decode.js` undoes each step.
 //!
 //! In the order of the bytes: for each frame, for each of the six numbers of a body, the difference
 //! from the last frame, zigzag coded, first the low bytes of all bodies, then the high bytes; then
-//! the index of the largest component and the speed of all bodies, each as a difference, too. At the
-//! very beginning stands each body's geometry.
+//! the index of the largest component and the speed of all bodies, each as a difference, too. At
+//! the very beginning stands each body's geometry.
 //!
 //! Source: Glenn Fiedler: "Snapshot Compression" (2015), for the three smallest components.
 
@@ -290,7 +290,8 @@ mod tests {
             }
         }
         assert_eq!(largest, found.error);
-        // Half a quantum along each axis; half a step of each component, and what the largest makes of it.
+        // Half a quantum along each axis; half a step of each component, and what the largest makes
+        // of it.
         assert!(found.error.distance <= 0.87 * found.quantum + 1e-6, "{:?}", found.error);
         assert!(found.error.distance > 0.4 * found.quantum, "{:?}", found.error);
         assert!((0.01..0.08).contains(&found.error.angle), "{:?}", found.error);

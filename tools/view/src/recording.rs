@@ -48,8 +48,8 @@ impl Recording {
         Self { bodies, geometries, kinds, frames: vec![] }
     }
 
-    /// Adds a frame after `step` steps, or between that step and the next; does nothing if the last frame
-    /// has its time. A body that `bodies` lacks stays where it was.
+    /// Adds a frame after `step` steps, or between that step and the next; does nothing if the last
+    /// frame has its time. A body that `bodies` lacks stays where it was.
     ///
     /// # Errors
     /// [`ViewError::Pose`], [`ViewError::Time`]: not finite. The recording is as it was.

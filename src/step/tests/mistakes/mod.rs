@@ -1,5 +1,5 @@
-//! The mistakes that drivers of this DMA core commonly make, and one test for each that fails if this
-//! driver makes it.
+//! The mistakes that drivers of this DMA core commonly make, and one test for each that fails if
+//! this driver makes it.
 //!
 //! Every test runs one check twice: on the driver as it is, which must pass, and with the mistake
 //! planted between driver and board ([`planted`]), which must be reported. The second run proves

@@ -1,5 +1,5 @@
-//! Loads the logic anew, or takes its power, at every register access from opening to a step that is
-//! taken again. No engine may fetch a descriptor outside the memory that it was granted.
+//! Loads the logic anew, or takes its power, at every register access from opening to a step that
+//! is taken again. No engine may fetch a descriptor outside the memory that it was granted.
 
 #![allow(clippy::print_stdout, reason = "the counts, which --nocapture shows")]
 
@@ -170,8 +170,8 @@ fn power_that_is_lost_at_any_access_moves_no_engine() {
     sweep(FaultKind::PowerLost, "gone");
 }
 
-/// Two accesses of each of eight channels let an engine fetch a descriptor at 0 or at the upper half
-/// of its ring's address: the write of the upper half, and the start.
+/// Two accesses of each of eight channels let an engine fetch a descriptor at 0 or at the upper
+/// half of its ring's address: the write of the upper half, and the start.
 #[test]
 fn mistake_20_start_believed_without_a_look() {
     for kind in [FaultKind::OtherBitstream { identification: 0 }, FaultKind::Reloaded] {

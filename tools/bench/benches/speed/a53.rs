@@ -55,7 +55,8 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     );
     let [one, two] = computing.map(milliseconds);
     println!(
-        "  packing takes {each:.0} instructions a collision: {one:.1} ms at one a clock, {two:.1} at two"
+        "  packing takes {each:.0} instructions a collision: {one:.1} ms at one a clock, {two:.1} \
+         at two"
     );
     println!("  the accelerator takes {:.2} ms at 12.8 GB/s (modelled)", milliseconds(device));
     println!("  cores  writing  reading  one after the other  overlapped");

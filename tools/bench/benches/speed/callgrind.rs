@@ -63,7 +63,8 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
     }
     let StepParameters { contact_iterations, friction_iterations, .. } = step.parameters;
     println!(
-        "done: {} collisions, {contact_iterations} contact and {friction_iterations} friction iterations",
+        "done: {} collisions, {contact_iterations} contact and {friction_iterations} friction \
+         iterations",
         step.collisions.len()
     );
     Ok(())
@@ -91,8 +92,8 @@ pub(crate) fn measure(options: &Options) -> Outcome {
     let [all, rows, contact, friction] = counts[..] else { return Err("a count for each".into()) };
     println!("Instructions of the yardstick, counted by callgrind");
     println!(
-        "  {contact:.0} a pair and contact pass, {friction:.0} a pair and friction pass, {rows:.0} a \
-         pair for its rows: {all:.0} a pair and pass in all\n"
+        "  {contact:.0} a pair and contact pass, {friction:.0} a pair and friction pass, \
+         {rows:.0} a pair for its rows: {all:.0} a pair and pass in all\n"
     );
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Refuses outputs of a call that share bytes with another of its arguments.
 //!
-//! Inputs may lie over each other; an output lies alone. Arrays of one structure may alternate: their
-//! elements are compared, not their ends.
+//! Inputs may lie over each other; an output lies alone. Arrays of one structure may alternate:
+//! their elements are compared, not their ends.
 
 use crate::failure::Failure;
 
@@ -47,8 +47,8 @@ impl Span {
         if apart || self.count == 0 || other.count == 0 {
             return false;
         }
-        // With one stride the places within it decide, but for the ends: most callers have an array of
-        // structures.
+        // With one stride the places within it decide, but for the ends: most callers have an array
+        // of structures.
         if self.stride == other.stride && self.first.abs_diff(other.first) < self.stride {
             let [low, high] = if self.first <= other.first { [self, other] } else { [other, self] };
             let distance = high.first - low.first;
@@ -82,8 +82,8 @@ pub(crate) fn refuse_overlap(
         let mut others = outputs[at + 1..].iter().copied().chain(inputs.clone());
         if let Some(other) = others.find(|other| output.meets(other)) {
             return Err(Failure::argument(format!(
-                "the {} and the {} share bytes, and the call writes the former: give each memory of its \
-                 own",
+                "the {} and the {} share bytes, and the call writes the former: give each memory \
+                 of its own",
                 output.name, other.name
             )));
         }

@@ -132,7 +132,8 @@ pub(super) fn extent(
     match fits {
         true => Ok(()),
         false => Err(Failure::argument(format!(
-            "{count} elements of the {name} exceed the address space: correct their number or stride"
+            "{count} elements of the {name} exceed the address space: correct their number or \
+             stride"
         ))),
     }
 }

@@ -65,7 +65,8 @@ fn check_size<T: Growing>(size: usize) -> Result<(), Failure> {
     }
     let (name, first) = (T::NAME, T::FIRST);
     Err(Failure::argument(format!(
-        "found {size} as the size of {name}, which has {first} bytes or more: set it to sizeof({name})"
+        "found {size} as the size of {name}, which has {first} bytes or more: set it to \
+         sizeof({name})"
     )))
 }
 
@@ -82,8 +83,8 @@ unsafe fn size_in<T: Growing>(pointer: NonNull<T>) -> Result<usize, Failure> {
 /// Reads a structure; a field that the caller's structure lacks comes from `defaults`.
 ///
 /// # Safety
-/// The pointer is null, or leads to initialised bytes, whose number is in their first field and which
-/// no other thread writes.
+/// The pointer is null, or leads to initialised bytes, whose number is in their first field and
+/// which no other thread writes.
 pub(crate) unsafe fn read<T: Growing>(pointer: *const T, defaults: T) -> Result<T, Failure> {
     let pointer = checked(pointer, T::NAME)?;
     // SAFETY: the caller promises the first field.
@@ -99,8 +100,8 @@ pub(crate) unsafe fn read<T: Growing>(pointer: *const T, defaults: T) -> Result<
     let unknown = unsafe { slice::from_raw_parts(rest, size - known) };
     if unknown.iter().any(|byte| *byte != 0) {
         return Err(Failure::argument(format!(
-            "{} has fields that this library does not know, and they are not zero: set them to zero, or \
-             use the library of the header",
+            "{} has fields that this library does not know, and they are not zero: set them to \
+             zero, or use the library of the header",
             T::NAME
         )));
     }

@@ -70,8 +70,8 @@ impl<T: Copy> Column<T> {
     unsafe fn get(&self, index: usize) -> T {
         // SAFETY: the caller promises the index.
         let element = unsafe { self.at(index) };
-        // SAFETY: aligned and in the caller's memory (the invariant), and initialised; nothing writes
-        // it.
+        // SAFETY: aligned and in the caller's memory (the invariant), and initialised; nothing
+        // writes it.
         unsafe { element.read() }
     }
 
@@ -109,8 +109,8 @@ impl BodiesView {
     /// Checks the arrays.
     ///
     /// # Safety
-    /// Each array is as [`BodyArrays`] describes, initialised, and lives as long as the view is in use.
-    /// Nothing but the view writes the arrays meanwhile.
+    /// Each array is as [`BodyArrays`] describes, initialised, and lives as long as the view is in
+    /// use. Nothing but the view writes the arrays meanwhile.
     pub(crate) unsafe fn new(arrays: BodyArrays) -> Result<Self, Failure> {
         let BodyArrays { count, shapes, .. } = arrays;
         let BodyArrays { positions, orientations, linear_velocities, angular_velocities, .. } =
@@ -206,8 +206,8 @@ impl CollisionsView<'_> {
     /// Checks the arrays.
     ///
     /// # Safety
-    /// The arrays are as [`CollisionArray`] describes, initialised, and live as long as the view is in
-    /// use. Nothing writes them meanwhile.
+    /// The arrays are as [`CollisionArray`] describes, initialised, and live as long as the view is
+    /// in use. Nothing writes them meanwhile.
     pub(crate) unsafe fn new(array: CollisionArray) -> Result<Self, Failure> {
         let CollisionArray { count, collisions, impulses, .. } = array;
         // SAFETY: the caller promises the array; a `Collision` takes every bit pattern.

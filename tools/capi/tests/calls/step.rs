@@ -54,7 +54,8 @@ fn collisions_with_gaps_between_them_are_the_same_collisions() {
     assert_eq!(crates, stepped());
 }
 
-/// The impulses that come out of two steps of the driver. The second begins with the impulses of the first.
+/// The impulses that come out of two steps of the driver. The second begins with the impulses of
+/// the first.
 fn warm_steps(parameters: &StepParameters) -> [zynq_pgs::Impulses; 2] {
     let mut board =
         Accelerator::open(OpenOptions::emulated("float").expect("a build")).expect("open");

@@ -1,5 +1,5 @@
-//! The examples, built by the system's compilers against the committed header and both kinds of library,
-//! give the bits of the same scenes in Rust.
+//! The examples, built by the system's compilers against the committed header and both kinds of
+//! library, give the bits of the same scenes in Rust.
 
 mod compiled;
 mod scenes;
@@ -50,8 +50,8 @@ fn shared_name() -> String {
     format!("libzynq_pgs_c.so.{}", zynq_pgs_c::ZPGS_ABI_VERSION)
 }
 
-/// Installs the shared library as docs/c.md says; the arguments that link it. The loader looks for the name
-/// with the version.
+/// Installs the shared library as docs/c.md says; the arguments that link it. The loader looks for
+/// the name with the version.
 fn with_shared(folder: &Path, example: Example) -> Vec<OsString> {
     let named = folder.join(shared_name());
     fs::copy(libraries().join("libzynq_pgs_c.so"), &named).expect("the shared library");

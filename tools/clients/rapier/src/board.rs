@@ -20,8 +20,8 @@ const PENETRATION_SHARE: f32 = 0.2;
 const PENETRATION_SPEED: f32 = 3.0;
 /// The distance at which Rapier finds contacts ahead, m.
 const PREDICTION: f32 = 0.02;
-/// The board applies the friction of a collision at the centre of its points. Two points at one edge give a
-/// face friction at two places, which resists a twist.
+/// The board applies the friction of a collision at the centre of its points. Two points at one
+/// edge give a face friction at two places, which resists a twist.
 const POINTS: usize = 2;
 /// A pass favours its last collisions, and a tower would lean to one side.
 const REVERSE_EVERY: u32 = 3;
@@ -176,8 +176,8 @@ impl Board {
     }
 }
 
-/// The speed at which a point may close, m/s. Below 0 the bodies must part. A gap closes within the step at
-/// most.
+/// The speed at which a point may close, m/s. Below 0 the bodies must part. A gap closes within the
+/// step at most.
 fn closing_speed(distance: f32) -> f32 {
     let speed = distance / TIME_STEP;
     if distance > 0.0 { speed } else { (speed * PENETRATION_SHARE).max(-PENETRATION_SPEED) }
@@ -218,8 +218,8 @@ mod tests {
         assert_eq!(closing_speed(-1.0).to_bits(), (-PENETRATION_SPEED).to_bits());
     }
 
-    /// The place of a brick after its fall on an edge. Its collider is turned and moved by `part` against the
-    /// body, and the body the other way.
+    /// The place of a brick after its fall on an edge. Its collider is turned and moved by `part`
+    /// against the body, and the body the other way.
     fn fallen(part: Pose) -> Result<Pose, zynq_pgs::Error> {
         let choice = "emulated:float,world".parse().unwrap_or_default();
         let options = OpenOptions { board: choice, ..OpenOptions::default() };

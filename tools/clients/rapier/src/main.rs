@@ -23,7 +23,8 @@ Without a scene: all.
   --board TEXT   the board, as in docs/library.md (emulated:float,world)
   --list         the scenes
 
-exit status: 0; 1 a limit does not hold, or a step failed; 2 wrong usage; 77 the board does not open,
+exit status: 0; 1 a limit does not hold, or a step failed; 2 wrong usage; 77 the board does not \
+open,
 nothing was run
 ";
 

@@ -1,7 +1,7 @@
 //! Chooses at most four points of a manifold.
 //!
-//! Rapier's manifolds have up to eight points, which a face that is turned against another gives. Four of
-//! them, far from each other, hold the bodies as well.
+//! Rapier's manifolds have up to eight points, which a face that is turned against another gives.
+//! Four of them, far from each other, hold the bodies as well.
 
 use rapier3d::prelude::Vector;
 
@@ -14,11 +14,11 @@ pub(crate) struct Point {
     pub(crate) distance: f32,
 }
 
-/// Reduces a manifold to at most four points: the deepest, the furthest from it, the furthest from the line
-/// through both, and the furthest on the line's other side.
+/// Reduces a manifold to at most four points: the deepest, the furthest from it, the furthest from
+/// the line through both, and the furthest on the line's other side.
 ///
-/// The nearest point of the first follows it, so that the first two lie at one edge of a face, and the last
-/// two at the opposite edge.
+/// The nearest point of the first follows it, so that the first two lie at one edge of a face, and
+/// the last two at the opposite edge.
 pub(crate) fn reduced(mut points: Vec<Point>) -> Vec<Point> {
     if points.len() > 4 {
         let first = take(&mut points, |point| -point.distance);

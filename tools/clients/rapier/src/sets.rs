@@ -65,8 +65,8 @@ impl Sets {
         self.bodies.get(body).map_or(Vector::ZERO, |body| body.translation())
     }
 
-    /// The kinetic energy of all bodies, J. `gravity_ahead` is the speed that gravity has added for the next
-    /// step already, m/s.
+    /// The kinetic energy of all bodies, J. `gravity_ahead` is the speed that gravity has added for
+    /// the next step already, m/s.
     pub(crate) fn kinetic_energy(&self, gravity_ahead: Vector) -> f64 {
         let moving = self.bodies.iter().filter(|(_, body)| body.is_dynamic());
         let energies = moving.map(|(_, body)| {
@@ -77,8 +77,8 @@ impl Sets {
         energies.fold(0.0, |sum, energy| sum + energy)
     }
 
-    /// The deepest penetration of two bodies where they are now, mm. Rapier's manifolds would not do: it keeps
-    /// the distances of contacts that have moved little.
+    /// The deepest penetration of two bodies where they are now, mm. Rapier's manifolds would not
+    /// do: it keeps the distances of contacts that have moved little.
     pub(crate) fn deepest(&self) -> f64 {
         let depths = self.narrow_phase.contact_pairs().map(|pair| {
             let colliders = [pair.collider1, pair.collider2].map(|at| self.colliders.get(at));

@@ -1,5 +1,5 @@
-//! The random numbers of C++'s `std::mt19937` and `std::uniform_real_distribution<float>`, which place the
-//! cubes of the Bullet client's pile.
+//! The random numbers of C++'s `std::mt19937` and `std::uniform_real_distribution<float>`, which
+//! place the cubes of the Bullet client's pile.
 
 const WORDS: usize = 624;
 const SHIFT: usize = 397;

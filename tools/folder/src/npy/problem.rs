@@ -80,8 +80,8 @@ pub enum Problem {
     },
     /// A file shorter than its shape.
     #[error(
-        "expected {expected} bytes of data by its shape {shape}, found {found}, {missing} fewer: is \
-         the file cut off?",
+        "expected {expected} bytes of data by its shape {shape}, found {found}, {missing} fewer: \
+         is the file cut off?",
         missing = expected - u128::from(*found)
     )]
     TooShort {

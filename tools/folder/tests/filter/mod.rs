@@ -21,8 +21,8 @@ pub(crate) fn refuse(calls: &[libc::c_long], errno: i32) -> Result<(), ()> {
     // SAFETY: PR_SET_NO_NEW_PRIVS takes numbers; the kernel accesses no memory of this process.
     let set = unsafe { libc::prctl(libc::PR_SET_NO_NEW_PRIVS, yes, none, none, none) };
     let mode = u64::from(libc::SECCOMP_MODE_FILTER);
-    // SAFETY: `program` has the address and the length of `filters`. Both live through the call, and the
-    // kernel copies them before it returns.
+    // SAFETY: `program` has the address and the length of `filters`. Both live through the call,
+    // and the kernel copies them before it returns.
     let filtered = unsafe { libc::prctl(libc::PR_SET_SECCOMP, mode, &raw const program) };
     if set == 0 && filtered == 0 { Ok(()) } else { Err(()) }
 }

@@ -87,8 +87,8 @@ impl Sized {
     fn any<T: Copy>(input: &mut Input<'_>, value: T) -> Self {
         let mut memory = vec![0_u64; STRUCTURE_BYTES / 8];
         assert!(size_of::<T>() <= STRUCTURE_BYTES && align_of::<T>() <= 8);
-        // SAFETY: `memory` is new and this function's own. The assertion says that the alignment of `u64`
-        // is enough for a `T`, and that there is room for one.
+        // SAFETY: `memory` is new and this function's own. The assertion says that the alignment of
+        // `u64` is enough for a `T`, and that there is room for one.
         unsafe { memory.as_mut_ptr().cast::<T>().write(value) };
         let right = size_of::<T>();
         memory[0] = match input.below(48) {
@@ -214,15 +214,16 @@ fn parameters(input: &mut Input<'_>) -> Sized {
 pub(super) fn run(bytes: &[u8]) -> Tally {
     let mut input = Input::new(bytes);
     let mut handle: *mut AcceleratorHandle = ptr::null_mut();
-    // SAFETY: the text ends with a null byte; `handle` is a local variable, which the call may write.
+    // SAFETY: the text ends with a null byte; `handle` is a local variable, which the call may
+    // write.
     let opened = unsafe { zpgs_open(c"emulated".as_ptr(), &raw mut handle) };
     assert_eq!(opened, Status::Ok);
     let shapes = [
         Shape { inverse_mass: 0.0, inverse_inertia: [0.0; 3] },
         Shape { inverse_mass: 1.0, inverse_inertia: [2.0; 3] },
     ];
-    // SAFETY: the handle is open; `shapes` has `shapes.len()` shapes, and lives through the call, which
-    // only reads them.
+    // SAFETY: the handle is open; `shapes` has `shapes.len()` shapes, and lives through the call,
+    // which only reads them.
     let loaded = unsafe { zpgs_set_shapes(handle, shapes.as_ptr(), shapes.len()) };
     assert_eq!(loaded, Status::Ok);
     let mut tally = Tally::default();
@@ -251,16 +252,17 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
     let mut started = Status::Ok;
     let choice = input.below(12);
     let status = match choice {
-        // `run` has opened the handle, and this thread alone uses it. A `Sized` has room for the largest
-        // structure that the interface takes, and a `Column` for every element at its stride; all of
-        // them live to the end of this function.
+        // `run` has opened the handle, and this thread alone uses it. A `Sized` has room for the
+        // largest structure that the interface takes, and a `Column` for every element at its
+        // stride; all of them live to the end of this function.
         // SAFETY: the handle is open; bodies, collisions and parameters have room.
         0 => unsafe { zpgs_submit(handle, given, wanted, steps) },
         // SAFETY: the handle is open; bodies and report have room.
         1 | 2 => unsafe { zpgs_wait(handle, given, told) },
         // SAFETY: the handle is open; bodies, collisions and parameters have room.
         3 => unsafe { zpgs_prepare(handle, given, wanted, steps) },
-        // SAFETY: the handle is open; bodies and report have room, and `started` is a local variable.
+        // SAFETY: the handle is open; bodies and report have room, and `started` is a local
+        // variable.
         4 => unsafe { zpgs_wait_and_start(handle, given, told, &raw mut started) },
         // SAFETY: the handle is open.
         5 => unsafe { zpgs_start(handle) },
@@ -268,7 +270,8 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
         6 => unsafe { zpgs_begin(handle) },
         7 => {
             let dense = vec![Collision::default(); pairs];
-            // SAFETY: the handle is open; `dense` has `pairs` collisions, and no impulses are given.
+            // SAFETY: the handle is open; `dense` has `pairs` collisions, and no impulses are
+            // given.
             unsafe { zpgs_push(handle, dense.as_ptr(), ptr::null(), pairs) }
         }
         // SAFETY: the handle is open; bodies and parameters have room.

@@ -36,29 +36,29 @@ pub struct Target {
 pub const ALL: &[Target] = &[
     Target {
         name: "registers",
-        about: "random register accesses, buffers and waits on the emulated board: owners keep their \
-                buffers, read-only buffers stay unchanged, and time goes on",
+        about: "random register accesses, buffers and waits on the emulated board: owners keep \
+                their buffers, read-only buffers stay unchanged, and time goes on",
         run: registers::run,
         longest: 256,
     },
     Target {
         name: "chains",
-        about: "random descriptors and direct transfers on memory that checks every access: no access \
-                outside the grants, and none without a request",
+        about: "random descriptors and direct transfers on memory that checks every access: no \
+                access outside the grants, and none without a request",
         run: chains::run,
         longest: 512,
     },
     Target {
         name: "packets",
-        about: "damaged steps of every profile: the accelerator ends, reports an error, or waits; after \
-                a reset the undamaged step has the bits of a fresh board",
+        about: "damaged steps of every profile: the accelerator ends, reports an error, or waits; \
+                after a reset the undamaged step has the bits of a fresh board",
         run: packets::run,
         longest: 192,
     },
     Target {
         name: "folders",
-        about: "damaged folders of arrays: the loader takes them or names the error, and a loaded step \
-                equals the files",
+        about: "damaged folders of arrays: the loader takes them or names the error, and a loaded \
+                step equals the files",
         run: folders::run,
         longest: 256,
     },
@@ -71,8 +71,9 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "faults",
-        about: "faults of the board during the driver's steps: each ends in time with the bits of a step \
-                without faults, or with an error that changed nothing, and the next one works",
+        about: "faults of the board during the driver's steps: each ends in time with the bits of \
+                a step without faults, or with an error that changed nothing, and the next one \
+                works",
         run: faults::run,
         longest: 320,
     },
@@ -85,8 +86,8 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "answers",
-        about: "the driver on a served board whose answers are falsified: opening and steps end, with \
-                an error that changed nothing or with a result",
+        about: "the driver on a served board whose answers are falsified: opening and steps end, \
+                with an error that changed nothing or with a result",
         run: served::answers,
         longest: 64,
     },
@@ -106,8 +107,8 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "calls",
-        about: "calls of the C interface with random sizes, strides and values: a refused call changes \
-                no byte, and no call a byte between the elements",
+        about: "calls of the C interface with random sizes, strides and values: a refused call \
+                changes no byte, and no call a byte between the elements",
         run: calls::run,
         longest: 512,
     },

@@ -71,7 +71,8 @@ impl Scene {
         Self { shapes, bodies, collisions, impulses }
     }
 
-    /// Sometimes has more shapes than the table of a board that can stream masses, and bodies of the last ones.
+    /// Sometimes has more shapes than the table of a board that can stream masses, and bodies of
+    /// the last ones.
     pub(super) fn outgrow(&mut self, input: &mut Input<'_>, variant: &Variant) {
         if !variant.has_streamed_masses() || !input.one_in(4) {
             return;

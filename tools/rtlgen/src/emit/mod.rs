@@ -21,8 +21,8 @@ pub struct File {
 /// Name of the top module.
 pub const TOP: &str = "pgs_top";
 
-/// All files of a design, ready for a tool: hand-written and generated modules, headers, `pgs.f`, the
-/// list of the modules, and `pgs_vivado.tcl`, the numbers of a block design.
+/// All files of a design, ready for a tool: hand-written and generated modules, headers, `pgs.f`,
+/// the list of the modules, and `pgs_vivado.tcl`, the numbers of a block design.
 #[must_use]
 pub fn files(design: &Design) -> Vec<File> {
     let file = |name: &str, text: String| File { name: name.into(), text };

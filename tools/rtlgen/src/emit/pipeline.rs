@@ -265,7 +265,8 @@ impl Emitter<'_> {
                 line!(text, "  wire {}{target};", range(width));
                 line!(
                     text,
-                    "  delay #(.WIDTH({width}), .SLOTS({})) delay_{target} (.clk(clk), .enable({enable}), .d({source}), .q({target}));",
+                    "  delay #(.WIDTH({width}), .SLOTS({})) delay_{target} (.clk(clk), \
+                     .enable({enable}), .d({source}), .q({target}));",
                     tap - from,
                 );
                 (from, source) = (tap, target);

@@ -58,7 +58,8 @@ mod tests {
     use super::*;
     use crate::design::Parameters;
 
-    /// The numbers of the specification, written out: a change of one is a change of every bitstream.
+    /// The numbers of the specification, written out: a change of one is a change of every
+    /// bitstream.
     #[test]
     fn the_numbers_are_those_of_the_interface() {
         let design = Design::new(Parameters { clock_khz: 250_000, ..Parameters::default() });

@@ -16,9 +16,9 @@ use crate::graph::{Graph, Source};
 /// `used_i` tells whether the collision has point i. The pass also adds the new impulses up, for
 /// the friction passes: `((L_0 + L_1) + L_2) + L_3`, in which an unused point counts -0.
 ///
-/// The impulse of a point with J = 0 stays 0 without a gate, because the wanted impulse is a product
-/// with J. The impulse of an unused point means nothing, and its flag keeps it from every sum. Where
-/// impulses leave the chip, both are put out as 0.
+/// The impulse of a point with J = 0 stays 0 without a gate, because the wanted impulse is a
+/// product with J. The impulse of an unused point means nothing, and its flag keeps it from every
+/// sum. Where impulses leave the chip, both are put out as 0.
 #[must_use]
 pub fn contact(points: usize, inertia: Inertia) -> Graph {
     let mut graph = Graph::default();

@@ -23,8 +23,9 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 
 /// The graph of a friction pass.
 ///
-/// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal impulse that the last contact pass stored, and
-/// `one_static` tells whether a body of the collision is static.
+/// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal
+/// impulse that the last contact pass stored, and `one_static` tells whether a body of the
+/// collision is static.
 #[must_use]
 pub fn friction(inertia: Inertia) -> Graph {
     let mut graph = Graph::default();

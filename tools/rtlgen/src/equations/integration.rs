@@ -9,9 +9,9 @@
 //!
 //! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
-//! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at rest it
-//! keeps its pose, too. The arguments of the sine and of the cosine are the same number, for
-//! a factor of 0.5 is exact.
+//! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
+//! rest it keeps its pose, too. The arguments of the sine and of the cosine are the same number,
+//! for a factor of 0.5 is exact.
 
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
 

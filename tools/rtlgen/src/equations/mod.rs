@@ -2,8 +2,8 @@
 //!
 //! Each module quotes its part of the specification and builds it in the same order; where the
 //! hardware takes another way to the same bits, the reason stands beside it. All numbers are f32.
-//! The initial impulses are 0, which the core feeds in the first passes. In a warm pass it feeds the given
-//! ones in their place.
+//! The initial impulses are 0, which the core feeds in the first passes. In a warm pass it feeds
+//! the given ones in their place.
 
 mod contact;
 mod friction;

@@ -98,7 +98,8 @@ mod tests {
         if operand.negated { -number } else { number }
     }
 
-    /// The sums of each component associate to the left: 10^8 - 10^8 + 1 is 1, and 0 in another order.
+    /// The sums of each component associate to the left: 10^8 - 10^8 + 1 is 1, and 0 in another
+    /// order.
     #[test]
     fn a_matrix_multiplies_by_its_rows_from_the_left() {
         let mut graph = Graph::default();

@@ -36,7 +36,8 @@ enum InertiaForm {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Build")]
 pub(crate) struct BuildArgs {
-    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed with every body
+    /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed
+    /// with every body
     #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
     inertia: InertiaForm,
     /// Bodies that the memories hold [default: 40960; with world inertia 16384]
@@ -59,8 +60,8 @@ pub(crate) struct BuildArgs {
     /// Products and quotients that round up to the smallest normal number
     #[arg(long, value_enum, default_value_t = SmallestNormal::Exact)]
     smallest_normal: SmallestNormal,
-    /// The only memory that the DMA masters reach, as 0x40000000+512M: a power of two of at least 64K, at a
-    /// multiple of it. The device tree must reserve the same
+    /// The only memory that the DMA masters reach, as 0x40000000+512M: a power of two of at least
+    /// 64K, at a multiple of it. The device tree must reserve the same
     #[arg(long, value_name = "BASE+BYTES", default_value_t = Fence::default())]
     memory: Fence,
     /// Clock that the capability register reports, kHz

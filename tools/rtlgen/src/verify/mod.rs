@@ -33,8 +33,8 @@ pub enum Error {
     },
     /// The temporary folder has a path that `make` does not take.
     #[error(
-        "Verilator's makefiles do not work in {}: set TMPDIR to a folder whose path has letters, digits \
-         and . _ - + , @ alone",
+        "Verilator's makefiles do not work in {}: set TMPDIR to a folder whose path has letters, \
+         digits and . _ - + , @ alone",
         folder.display()
     )]
     Place {

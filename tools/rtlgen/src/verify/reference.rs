@@ -1,5 +1,6 @@
 //! The operators by software: binary32 arithmetic in integers, from `rustc_apfloat` and of its own,
-//! with the flush rules of the specification. The processor's floating-point unit has no part in it.
+//! with the flush rules of the specification. The processor's floating-point unit has no part in
+//! it.
 
 use rustc_apfloat::ieee::{Double, Single};
 use rustc_apfloat::{Float as _, FloatConvert as _, StatusAnd};

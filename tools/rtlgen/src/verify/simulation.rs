@@ -1,5 +1,5 @@
-//! A simulator process built by Verilator: operands of one cycle after the other go in, results come
-//! out.
+//! A simulator process built by Verilator: operands of one cycle after the other go in, results
+//! come out.
 
 use std::fs;
 use std::io::{self, Read as _, Write as _};

@@ -39,8 +39,8 @@ pub fn require(purpose: &'static str) -> Result<(), Error> {
     }
 }
 
-/// Whether Verilator's makefiles work in a folder: `make` takes spaces and some other characters of the
-/// path for its own.
+/// Whether Verilator's makefiles work in a folder: `make` takes spaces and some other characters of
+/// the path for its own.
 ///
 /// # Errors
 ///
@@ -64,7 +64,8 @@ pub fn place() -> Result<TempDir, Error> {
     }
 }
 
-/// Builds `obj/V<top>` in a folder that [`takes`] it. Warnings do not stop it: a seeded mistake may cause one.
+/// Builds `obj/V<top>` in a folder that [`takes`] it. Warnings do not stop it: a seeded mistake may
+/// cause one.
 ///
 /// # Errors
 ///

@@ -92,8 +92,8 @@ impl Touch {
     }
 }
 
-/// Makes one touch for each candidate. A pair that was a candidate before keeps its touch. Both lists
-/// are sorted.
+/// Makes one touch for each candidate. A pair that was a candidate before keeps its touch. Both
+/// lists are sorted.
 pub(super) fn follow(touches: &mut Vec<Touch>, candidates: &[(u32, u32)]) {
     let mut left = candidates.iter().copied().peekable();
     touches.retain(|touch| {

@@ -83,7 +83,8 @@ impl Dump {
     }
 }
 
-/// Asserts that the dump shows the accesses, beats, packets and the interrupt that the board counts.
+/// Asserts that the dump shows the accesses, beats, packets and the interrupt that the board
+/// counts.
 pub(crate) fn assert_agrees(taken: &Taken) {
     let recording = &taken.recording;
     let mut out = Vec::new();

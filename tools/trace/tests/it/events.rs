@@ -44,8 +44,8 @@ pub(crate) fn assert_agrees(taken: &Taken) {
     assert_eq!(of("host").count(), 7);
 }
 
-/// The events on the thread of a channel's packets: each packet, with its beats as the states within it have
-/// them.
+/// The events on the thread of a channel's packets: each packet, with its beats as the states
+/// within it have them.
 fn packets(events: &[Value], thread: &str) -> Vec<(String, u64, u64)> {
     let named = |event: &&Value| {
         event["name"] == "thread_name" && event["pid"] == 1 && event["args"]["name"] == thread

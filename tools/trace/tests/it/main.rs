@@ -1,4 +1,5 @@
-//! The files of a recorded step agree with the counts and logs that the board keeps beside the recording.
+//! The files of a recorded step agree with the counts and logs that the board keeps beside the
+//! recording.
 
 mod dump;
 mod events;

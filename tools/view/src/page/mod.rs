@@ -109,8 +109,8 @@ fn view(recording: &Recording) -> ([f32; 3], [f32; 3]) {
     ([0, 1, 2].map(|axis| most(axis, -1.0)), [0, 1, 2].map(|axis| most(axis, 1.0)))
 }
 
-/// The surface that the page draws for a geometry: a box by its size, all others by triangles; and the radii of
-/// the balls inside and around it.
+/// The surface that the page draws for a geometry: a box by its size, all others by triangles; and
+/// the radii of the balls inside and around it.
 fn kind(geometry: &Geometry, mesh: &Mesh) -> Value {
     let places = mesh.positions.iter().zip(&mesh.normals);
     let inside = places.map(|(position, normal)| dot(*position, *normal));

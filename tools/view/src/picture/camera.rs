@@ -85,8 +85,8 @@ impl View {
         self.camera.eye
     }
 
-    /// The pixel of a point, from the left and from above, and the inverse of its distance; none for
-    /// a point behind the eye.
+    /// The pixel of a point, from the left and from above, and the inverse of its distance; none
+    /// for a point behind the eye.
     pub(super) fn project(&self, point: [f32; 3]) -> Option<[f32; 3]> {
         let [right, up, towards] = self.axes.map(|axis| dot(axis, minus(point, self.camera.eye)));
         let inverse = -1.0 / towards;

@@ -8,7 +8,8 @@
 //! let pose = Pose { position: [0.0, 1.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
 //! let bodies = [Body { pose, velocity: Velocity::default(), shape: 0 }];
 //! let camera = Camera::around([pose].iter(), 1.8, 1.5);
-//! let picture = Picture { width: 300, height: 200, ..Picture::new(&bodies, &[Some(Geometry::CUBE)], camera) };
+//! let cubes = Picture::new(&bodies, &[Some(Geometry::CUBE)], camera);
+//! let picture = Picture { width: 300, height: 200, ..cubes };
 //! assert!(picture.svg()?.starts_with("<svg"));
 //! assert!(picture.png()?.starts_with(b"\x89PNG"));
 //! # Ok::<(), zynq_pgs_view::ViewError>(())

@@ -16,8 +16,8 @@ const UNITS: u16 = 2;
 impl Picture<'_> {
     /// The picture as SVG.
     ///
-    /// Hidden faces are left out. The others are painted from far to near, which is exact for bodies
-    /// that do not intersect much.
+    /// Hidden faces are left out. The others are painted from far to near, which is exact for
+    /// bodies that do not intersect much.
     ///
     /// # Errors
     /// [`ViewError`]: the picture has no pixels or too many, or a geometry has no surface.

@@ -43,8 +43,8 @@ struct Args {
     /// The interrupt (SPI), as the device tree counts
     #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
     spi: u32,
-    /// Simulator of the generated Verilog, the accelerator in place of the model; `rtlgen simulator`
-    /// builds one
+    /// Simulator of the generated Verilog, the accelerator in place of the model;
+    /// `rtlgen simulator` builds one
     #[arg(long, value_name = "PATH")]
     simulator: Option<PathBuf>,
     /// Time limit of the guest, seconds
