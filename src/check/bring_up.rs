@@ -351,12 +351,10 @@ mod tests {
         assert!(identity(&registers.window(RegisterMap::Control), &mut lines).is_none());
         let lines = lines.finish();
         assert_eq!(lines[1].outcome, Outcome::ok("2.0"));
-        assert!(
-            matches!(
-                &lines[2].outcome,
-                Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503"
-            )
-        );
+        assert!(matches!(
+            &lines[2].outcome,
+            Outcome::Failed { found, .. } if found == "CHANNELS 0x00000503"
+        ));
         assert!(matches!(&lines[3].outcome, Outcome::Skipped { .. }));
     }
 }

@@ -111,12 +111,10 @@ fn packets_that_are_too_short_too_long_or_without_an_end_are_told_apart() {
     let (_, tampered, mut accelerator) = Tampered::open();
     tampered.after_wait(|rings| rings.change(receiver(1), 0, |status| status & !RXEOF));
     let error = failed(&tampered, &mut accelerator);
-    assert!(
-        matches!(
-            fault_of(&error),
-            Fault::Channel { cause: ChannelFault::NoPacketEnd, at } if at.channel.core == 1
-        )
-    );
+    assert!(matches!(
+        fault_of(&error),
+        Fault::Channel { cause: ChannelFault::NoPacketEnd, at } if at.channel.core == 1
+    ));
     recovered(&mut accelerator, &error);
 
     let (_, tampered, mut accelerator) = Tampered::open();
@@ -139,12 +137,10 @@ fn a_status_that_never_reaches_memory_is_not_taken_for_a_channel_that_hangs() {
     let (_, tampered, mut accelerator) = Tampered::open();
     tampered.after_wait(|rings| rings.change(receiver(2), 0, |_| 0));
     let error = failed(&tampered, &mut accelerator);
-    assert!(
-        matches!(
-            fault_of(&error),
-            Fault::Channel { cause: ChannelFault::StatusMissing, at } if at.channel.core == 2
-        )
-    );
+    assert!(matches!(
+        fault_of(&error),
+        Fault::Channel { cause: ChannelFault::StatusMissing, at } if at.channel.core == 2
+    ));
     recovered(&mut accelerator, &error);
 }
 

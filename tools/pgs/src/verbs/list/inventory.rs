@@ -49,9 +49,7 @@ impl Node {
 
     pub(super) fn to_json(&self) -> Value {
         let UioNode { device, name, maps, .. } = &self.node;
-        let map = |map: &zynq_pgs::platform::UioMap| {
-            json!({ "name": map.name, "address": map.address, "bytes": map.bytes })
-        };
+        let map = |map: &zynq_pgs::platform::UioMap| json!({ "name": map.name, "address": map.address, "bytes": map.bytes });
         let maps: Vec<Value> = maps.iter().map(map).collect();
         let value_of = |option| match &self.uses {
             Some((found, value)) if *found == option => Some(value),
