@@ -13,6 +13,7 @@ mod fault;
 mod handle;
 mod memory;
 pub mod recording;
+pub mod reference;
 #[cfg(unix)]
 pub mod remote;
 mod shortcut;

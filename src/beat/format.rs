@@ -2,11 +2,12 @@
 
 use std::marker::PhantomData;
 
+use pgs_interface::number::StreamFormat;
 use pgs_interface::record::Beat;
 use pgs_support::chunks::Chunks;
 
 use crate::record::body_table::{Ends, Lookup, LowEnds};
-use crate::record::sixteen::Sixteen;
+use crate::record::sixteen;
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
 
@@ -39,8 +40,8 @@ pub(crate) trait Join {
 
 /// The format of a stream's words.
 pub(crate) trait Format: Join {
-    /// The 16-bit format of the words; `None` for f32.
-    const SIXTEEN: Option<Sixteen>;
+    /// The format of the words.
+    const WORDS: StreamFormat;
 
     /// The table for look-ups of the bodies whose indices the stream carries.
     type Among<'a>: Lookup<'a>;
@@ -93,20 +94,12 @@ macro_rules! in_format {
     ($format:expr, $name:ident => $work:expr) => {
         // A loop for each format, so that no loop tests the format.
         match $format {
-            None => {
+            pgs_interface::number::StreamFormat::F32 => {
                 type $name = $crate::beat::format::Whole;
                 $work
             }
-            Some($crate::record::sixteen::Sixteen::Binary16) => {
+            pgs_interface::number::StreamFormat::Binary16 => {
                 type $name = $crate::beat::format::Binary16;
-                $work
-            }
-            Some($crate::record::sixteen::Sixteen::Thesis16) => {
-                type $name = $crate::beat::format::Thesis16;
-                $work
-            }
-            Some($crate::record::sixteen::Sixteen::Thesis16Literal) => {
-                type $name = $crate::beat::format::Thesis16Literal;
                 $work
             }
         }
@@ -127,7 +120,7 @@ impl Join for Whole {
 }
 
 impl Format for Whole {
-    const SIXTEEN: Option<Sixteen> = None;
+    const WORDS: StreamFormat = StreamFormat::F32;
 
     type Among<'a> = Ends<'a>;
 
@@ -144,40 +137,26 @@ impl Format for Whole {
 /// Words of binary16.
 pub(crate) struct Binary16;
 
-/// Words of the thesis' 16-bit format.
-pub(crate) struct Thesis16;
+impl Join for Binary16 {
+    const PER_BEAT: usize = 2;
 
-/// Words of the thesis' 16-bit format, with its encoder taken literally.
-pub(crate) struct Thesis16Literal;
-
-/// A format of two rows a beat.
-macro_rules! sixteen {
-    ($format:ident) => {
-        impl Join for $format {
-            const PER_BEAT: usize = 2;
-
-            #[inline(always)]
-            fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {
-                bytemuck::cast(Sixteen::$format.narrow(vectors, rows))
-            }
-        }
-
-        impl Format for $format {
-            const SIXTEEN: Option<Sixteen> = Some(Sixteen::$format);
-
-            type Among<'a> = LowEnds<'a>;
-
-            #[inline(always)]
-            fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS] {
-                let mut rows = [Lanes::all(0); ROWS];
-                for (to, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
-                    *to = Sixteen::$format.widen(vectors, bytemuck::cast(*beat));
-                }
-                rows
-            }
-        }
-    };
+    #[inline(always)]
+    fn beat<V: Vectors>(vectors: V, rows: [Row; 2]) -> Beat {
+        bytemuck::cast(sixteen::narrow(vectors, rows))
+    }
 }
-sixteen!(Binary16);
-sixteen!(Thesis16);
-sixteen!(Thesis16Literal);
+
+impl Format for Binary16 {
+    const WORDS: StreamFormat = StreamFormat::Binary16;
+
+    type Among<'a> = LowEnds<'a>;
+
+    #[inline(always)]
+    fn wide<V: Vectors, const ROWS: usize>(vectors: V, beats: &[Beat]) -> [Lanes; ROWS] {
+        let mut rows = [Lanes::all(0); ROWS];
+        for (to, beat) in rows.split_arrays_mut::<2>().0.iter_mut().zip(beats) {
+            *to = sixteen::widen(vectors, bytemuck::cast(*beat));
+        }
+        rows
+    }
+}

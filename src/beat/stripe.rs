@@ -28,6 +28,13 @@ use pgs_interface::profile::Variant;
 use pgs_interface::record::{LANES, collision, pose, result};
 use pgs_interface::stripe::Stripe;
 
+use crate::simd::Lanes;
+
+/// Records of a block. The number is divisible by the records of a group of every stripe, so that
+/// each block begins with a group. A block and the collisions that are prefetched meanwhile fit in
+/// the L1 cache.
+pub(crate) const BLOCK: usize = 30;
+
 /// The records that a segment carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Segment {
@@ -163,6 +170,11 @@ impl Deal {
 // A row of f32 is a beat.
 const _: () = assert!(LANES * 4 == pgs_interface::record::BEAT_BYTES);
 
+/// The sum of the lanes' sums.
+pub(crate) fn total(sum: Lanes) -> u32 {
+    sum.words().into_iter().fold(0, u32::wrapping_add)
+}
+
 #[cfg(test)]
 mod tests {
     use super::Segment::{Collisions, Poses, Results, Velocities, WarmCollisions};
@@ -220,9 +232,9 @@ mod tests {
 
     #[test]
     fn world_inertia_doubles_the_velocities_alone() {
-        let world = Variant { inertia: Inertia::World, ..HALF.default_variant() };
-        assert_eq!(Velocities.layout(&world).beats(5), 10);
-        assert_eq!(Poses.layout(&world).beats(5), 5);
+        let world = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };
+        assert_eq!(Velocities.layout(&world).beats(5), 20);
+        assert_eq!(Poses.layout(&world).beats(5), 10);
     }
 
     #[test]

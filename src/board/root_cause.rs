@@ -5,7 +5,7 @@ use pgs_interface::control::{ErrorCode, error};
 use pgs_interface::descriptor::status;
 
 use super::device::Device;
-use super::symptom::Symptom;
+use super::symptom::{Symptom, control_block_reset};
 use crate::axi_dma::{ChannelName, Direction};
 use crate::control_block::{Changed, StickyError};
 use crate::fault::diagnosis::{ChannelState, ControlState, Diagnosis};
@@ -54,11 +54,6 @@ fn root_cause(diagnosis: &Diagnosis, symptom: Symptom) -> Fault {
             _ => standing(diagnosis, symptom),
         },
     }
-}
-
-/// The fault of an accelerator whose registers are as after a reset.
-pub(super) fn control_block_reset() -> Fault {
-    Fault::LogicReset { region: "the control block".to_owned() }
 }
 
 /// The cause that the channels and the accelerator show, or else the symptom's.

@@ -53,3 +53,8 @@ impl From<PlatformError> for Symptom {
         Self::Known(error.into())
     }
 }
+
+/// The fault of an accelerator whose registers are as after a reset.
+pub(super) fn control_block_reset() -> Fault {
+    Fault::LogicReset { region: "the control block".to_owned() }
+}

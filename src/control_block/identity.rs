@@ -168,11 +168,13 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
                 && issue::COLLISIONS.of(word) == profile.collisions_per_issue
         },
     )?;
-    let able = read(&FEATURES);
+    let able = checked(window, &FEATURES, "isotropic inertia, as the profile has it", |word| {
+        profile.world.is_some() || !features::WORLD_INERTIA.is_set(word)
+    })?;
     let world = features::WORLD_INERTIA.is_set(able);
     let variant = Variant {
         profile,
-        numbers: numbers_of(window, profile, world)?,
+        numbers: numbers_of(window, profile)?,
         inertia: if world { Inertia::World } else { Inertia::Isotropic },
     };
     let shape_capacity = checked(
@@ -235,7 +237,7 @@ const fn coded(width: u32) -> u32 {
 
 /// Reads the number formats. They must be known, as wide as the profile's stripes assume, and
 /// sufficient for its records.
-fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers, IdentityError> {
+fn numbers_of(window: &Window, profile: &Profile) -> Result<Numbers, IdentityError> {
     let found = window.read32(NUMBERS.offset);
     let refused = |expected| IdentityError::Capability { register: NUMBERS.name, found, expected };
     let format = |field: Field| {
@@ -261,9 +263,6 @@ fn numbers_of(window: &Window, profile: &Profile, world: bool) -> Result<Numbers
         || numbers.poses.bits() != own.poses.bits()
     {
         return Err(refused("words as wide on the streams as the profile has them"));
-    }
-    if world && !numbers.bodies.has_zero_and_infinity() {
-        return Err(refused("a format with a zero, which is the inverse inertia of a static body"));
     }
     if (numbers.rows, numbers.updates) == (Precision::F32, Precision::Binary16) {
         return Err(refused("rows of no more precision than the updates that take them"));
@@ -435,12 +434,12 @@ mod tests {
         let with = |registers: &[(u32, u32)], more: &[(u32, u32)]| {
             identify_with(&[registers, more].concat())
         };
-        // thesis16 on both streams, arithmetic and arrays of mixed kinds.
-        let found = with(&HALF_REGISTERS, &[(0x144, 0x0210_0122)]).expect("known formats");
+        // Arithmetic and arrays of mixed kinds.
+        let found = with(&HALF_REGISTERS, &[(0x144, 0x0110_0111)]).expect("known formats");
         let expected = Numbers {
-            collisions: StreamFormat::Thesis16,
-            bodies: StreamFormat::Thesis16,
-            poses: StreamFormat::Thesis16,
+            collisions: StreamFormat::Binary16,
+            bodies: StreamFormat::Binary16,
+            poses: StreamFormat::Binary16,
             rows: Precision::Binary16,
             updates: Precision::F32,
             velocities: Precision::F32,
@@ -449,13 +448,9 @@ mod tests {
         assert_eq!(found.variant.numbers, expected);
         let found = with(&[], &[(0x10C, 0x3)]).expect("with world inertia");
         assert_eq!(found.variant.inertia, Inertia::World);
-        let error = with(&HALF_REGISTERS, &[(0x144, 0x0200_0022), (0x10C, 0x3)]);
-        let error = error.expect_err("no zero").to_string();
-        assert!(error.starts_with("NUMBERS is 0x02000022") && error.contains("zero"), "{error}");
-        let literal = with(&HALF_REGISTERS, &[(0x144, 0x0311_1133)]).expect("known formats");
-        let numbers = literal.variant.numbers;
-        let of_streams = [numbers.collisions, numbers.bodies, numbers.poses];
-        assert_eq!(of_streams, [StreamFormat::Thesis16Literal; 3]);
+        let error = with(&HALF_REGISTERS, &[(0x10C, 0x3)]);
+        let error = error.expect_err("half has no such build").to_string();
+        assert!(error.starts_with("FEATURES is 0x00000003, expected isotropic"), "{error}");
     }
 
     #[test]

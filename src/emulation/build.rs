@@ -2,7 +2,7 @@
 
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
 use pgs_interface::fence::Fence;
-use pgs_interface::number::{Numbers, Precision, StreamFormat};
+use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{FLOAT, Inertia, Profile};
 
 /// The build of an emulated board, option by option; `None` is the default of the board or of its
@@ -14,8 +14,6 @@ use pgs_interface::profile::{FLOAT, Inertia, Profile};
 pub struct Build {
     /// Design of the accelerator.
     pub profile: Option<&'static Profile>,
-    /// Numbers on the streams that have its width in the profile.
-    pub format: Option<StreamFormat>,
     /// Precision of the pipeline's operators; storage keeps the width of the profile.
     pub arithmetic: Option<Precision>,
     /// Form in which the board gets the inertia of its bodies.
@@ -66,19 +64,9 @@ impl Build {
         }
     }
 
-    /// The profile's number formats, with the formats of the options in their place.
+    /// The profile's number formats, with the arithmetic of the options in its place.
     fn numbers(&self, own: &Numbers) -> Numbers {
         let mut numbers = *own;
-        if let Some(format) = self.format {
-            let narrow = |stream: StreamFormat| stream.bits() == format.bits();
-            // Where no stream has 16 bits, the board's error tells which widths do not fit.
-            let none = ![own.collisions, own.bodies, own.poses].into_iter().any(narrow);
-            for stream in [&mut numbers.collisions, &mut numbers.bodies, &mut numbers.poses] {
-                if none || narrow(*stream) {
-                    *stream = format;
-                }
-            }
-        }
         if let Some(arithmetic) = self.arithmetic {
             (numbers.rows, numbers.updates) = (arithmetic, arithmetic);
         }
@@ -95,16 +83,10 @@ impl Build {
         }
         let default = BoardConfig::default();
         let (own, numbers) = (config.profile.numbers, config.variant().numbers);
-        // The format f32 has no name in a build.
-        let format = unlike(numbers.collisions, own.collisions)
-            .or_else(|| unlike(numbers.bodies, own.bodies))
-            .or_else(|| unlike(numbers.poses, own.poses))
-            .filter(|format| *format != StreamFormat::F32);
         let arithmetic =
             unlike(numbers.updates, own.updates).or_else(|| unlike(numbers.rows, own.rows));
         Self {
             profile: Some(config.profile),
-            format,
             arithmetic,
             inertia: unlike(config.inertia, default.inertia),
             hazards: unlike(config.hazards, default.hazards),
@@ -122,6 +104,8 @@ impl Build {
 
 #[cfg(test)]
 mod tests {
+    use pgs_interface::profile::HALF;
+
     use super::*;
 
     #[test]
@@ -130,21 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn a_format_goes_where_the_streams_have_its_width() {
-        let numbers = |profile, format, arithmetic| {
-            let profile = Profile::by_name(profile);
-            let config = Build { profile, format, arithmetic, ..Build::default() }.config();
-            (config.numbers.is_some(), config.variant().numbers)
-        };
-        let (changed, half) = numbers("half", Some(StreamFormat::Binary16), None);
-        assert_eq!((changed, half), (false, Numbers::BINARY16));
-        let thesis = StreamFormat::Thesis16;
-        let (_, half) = numbers("half", Some(thesis), Some(Precision::F32));
-        assert_eq!((half.collisions, half.bodies), (thesis, thesis));
-        assert_eq!((half.rows, half.updates), (Precision::F32, Precision::F32));
-        assert_eq!(half.velocities, Precision::Binary16, "storage stays");
-        // The board refuses it, and names the reason.
-        let (_, float) = numbers("float", Some(thesis), None);
-        assert_eq!((float.collisions, float.bodies), (thesis, thesis));
+    fn the_arithmetic_changes_the_operators_alone() {
+        let build = Build { profile: Some(&HALF), ..Build::default() };
+        assert_eq!(build.config().numbers, None);
+        let build = Build { arithmetic: Some(Precision::F32), ..build };
+        let half = build.config().variant().numbers;
+        let (rows, updates) = (Precision::F32, Precision::F32);
+        assert_eq!(half, Numbers { rows, updates, ..Numbers::BINARY16 });
     }
 }

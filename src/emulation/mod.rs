@@ -4,21 +4,19 @@
 //! use zynq_pgs::emulation::Build;
 //!
 //! # fn main() -> Result<(), zynq_pgs::emulation::BuildError> {
-//! let build: Build = "half,thesis16,f32,unchecked,threads=1".parse()?;
+//! let build: Build = "half,f32,unchecked,threads=1".parse()?;
 //! assert_eq!(build.config().profile.name, "half");
-//! assert_eq!(build.to_string(), "half,thesis16,f32,unchecked,threads=1");
+//! assert_eq!(build.to_string(), "half,f32,unchecked,threads=1");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! A text is a list that begins with the profile; the other options follow in any order. A name
-//! stands for itself where an option has it first, and behind the option's key elsewhere: `binary16`
-//! is the format of a stream, `arithmetic=binary16` the precision of the operators.
+//! A text is a list that begins with the profile; the other options follow in any order. A number,
+//! and `on` and `off`, stand behind the option's key, every other name alone.
 //!
 //! | key | values | default |
 //! |---|---|---|
 //! | `profile` | the name of a [profile](pgs_interface::profile::PROFILES) | `float` |
-//! | `format` | numbers on streams of 16 bits: `binary16`, `thesis16`, `thesis16-literal` | the profile's |
 //! | `arithmetic` | precision of the operators: `f32`, `binary16` | the profile's |
 //! | `hazards` | on a hazard wait, or read the stale velocity: `interlocked`, `unchecked` | `interlocked` |
 //! | `window` | hazard window in issue slots | the profile's |

@@ -4,8 +4,8 @@ use pgs_interface::profile::{PROFILES, Profile};
 
 use super::build::Build;
 use super::values::{
-    FORMATS, HAZARDS, INERTIA, LANES, PRECISIONS, SUBNORMALS, address_width, bandwidth,
-    bandwidth_text, fence, length_width, name_of, named, threads, window,
+    HAZARDS, INERTIA, LANES, PRECISIONS, SUBNORMALS, address_width, bandwidth, bandwidth_text,
+    fence, length_width, name_of, named, threads, window,
 };
 
 /// One option of a build.
@@ -66,9 +66,8 @@ const PROFILE: BuildOption = BuildOption {
 };
 
 /// Every option, in the order of a text.
-pub(super) const OPTIONS: [BuildOption; 13] = [
+pub(super) const OPTIONS: [BuildOption; 12] = [
     PROFILE,
-    choice!("format", format, FORMATS, true),
     choice!("arithmetic", arithmetic, PRECISIONS, true),
     choice!("hazards", hazards, HAZARDS, true),
     number!("window", window, "SLOTS", window, |slots| slots.to_string()),

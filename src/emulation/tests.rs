@@ -4,7 +4,7 @@ use std::fmt;
 
 use bitstream_model::{Bandwidth, EmulatedBoard, Hazards, Subnormals};
 use pgs_interface::fence::Fence;
-use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::number::Precision;
 use pgs_interface::profile::{Inertia, PROFILES, Profile};
 use proptest::prelude::*;
 
@@ -21,9 +21,9 @@ fn a_build_is_written_as_it_is_read() {
         "float",
         "half",
         "float,interlocked",
-        "half,thesis16,f32,unchecked",
-        "half,f32,unchecked,world",
-        "half,binary16,arithmetic=binary16,interlocked,window=64,flush,isotropic",
+        "half,f32,unchecked",
+        "float,unchecked,world",
+        "half,binary16,interlocked,window=64,flush,isotropic",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
         "float,fence=0x40000000+512M",
         "float,bandwidth=17.07,threads=1,lanes=off",
@@ -36,17 +36,16 @@ fn a_build_is_written_as_it_is_read() {
 
 #[test]
 fn words_may_stand_in_any_order() {
-    let expected = build("half,thesis16,f32,unchecked,flush");
-    assert_eq!(build("half,flush,unchecked,arithmetic=f32,format=thesis16"), expected);
+    let expected = build("half,f32,unchecked,flush");
+    assert_eq!(build("half,flush,unchecked,arithmetic=f32"), expected);
 }
 
 #[test]
 fn a_word_means_what_the_option_means() {
-    let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+    let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
                 length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
     let expected = Build {
         profile: Profile::by_name("half"),
-        format: Some(StreamFormat::Binary16),
         arithmetic: Some(Precision::F32),
         inertia: Some(Inertia::World),
         hazards: Some(Hazards::Unchecked),
@@ -83,8 +82,8 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
         assert_eq!(
             error.to_string(),
             format!(
-                "{:?} is no option of a build: give one of binary16, thesis16, \
-                 thesis16-literal, f32, arithmetic=f32|binary16, interlocked, unchecked, window=SLOTS, keep, flush, \
+                "{:?} is no option of a build: give one of f32, binary16, \
+                 interlocked, unchecked, window=SLOTS, keep, flush, \
                  isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
                  address-width=BITS, fence=BASE+BYTES, threads=N, lanes=on|off",
                 text.split_once(',').expect("two words").1
@@ -100,7 +99,6 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
         ("float,window=", "window=: expected a whole number from 1 to 4294967295"),
         ("float,threads=0", "threads=0: expected a whole number from 1 to 31"),
         ("half,arithmetic=f64", "arithmetic=f64: expected f32 or binary16"),
-        ("half,format=f32", "format=f32: expected binary16 or thesis16 or thesis16-literal"),
     ] {
         assert_eq!(build(text).expect_err(text).to_string(), expected);
     }
@@ -124,27 +122,28 @@ fn any_build() -> impl Strategy<Value = Build> {
     let fences = fences.map(|text| text.parse::<Fence>().expect(text));
     (
         prop::sample::select(PROFILES.to_vec()),
-        (any_of(super::values::FORMATS.map(|(_, format)| format)), any_of(Precision::ALL)),
+        any_of(Precision::ALL),
         (any_of([Inertia::Isotropic, Inertia::World]), any_of([true, false])),
         any_of([Hazards::Interlocked, Hazards::Unchecked]),
         any_of([Subnormals::Keep, Subnormals::Flush]),
         (prop::option::of(1..=u32::MAX), prop::option::of(rate), prop::option::of(1_usize..=31)),
         (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64), any_of(fences)),
     )
-        .prop_map(|(profile, formats, choices, hazards, subnormals, numbers, widths)| Build {
-            profile: Some(profile),
-            format: formats.0,
-            arithmetic: formats.1,
-            inertia: choices.0,
-            lanes: choices.1,
-            hazards,
-            subnormals,
-            window: numbers.0,
-            bandwidth: numbers.1,
-            threads: numbers.2,
-            length_width: widths.0,
-            address_width: widths.1,
-            fence: widths.2,
+        .prop_map(|(profile, arithmetic, choices, hazards, subnormals, numbers, widths)| {
+            Build {
+                profile: Some(profile),
+                arithmetic,
+                inertia: choices.0,
+                lanes: choices.1,
+                hazards,
+                subnormals,
+                window: numbers.0,
+                bandwidth: numbers.1,
+                threads: numbers.2,
+                length_width: widths.0,
+                address_width: widths.1,
+                fence: widths.2,
+            }
         })
 }
 

@@ -6,17 +6,12 @@ use std::str::FromStr;
 use bitstream_model::{Bandwidth, Hazards, Subnormals, THREADS_MAX};
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::fence::{Fence, NoFence};
-use pgs_interface::number::{Precision, StreamFormat};
+use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
 
 /// A value with its name.
 type Named<T> = (&'static str, T);
 
-pub(super) const FORMATS: [Named<StreamFormat>; 3] = [
-    (StreamFormat::Binary16.name(), StreamFormat::Binary16),
-    (StreamFormat::Thesis16.name(), StreamFormat::Thesis16),
-    (StreamFormat::Thesis16Literal.name(), StreamFormat::Thesis16Literal),
-];
 pub(super) const PRECISIONS: [Named<Precision>; 2] =
     [(Precision::F32.name(), Precision::F32), (Precision::Binary16.name(), Precision::Binary16)];
 pub(super) const HAZARDS: [Named<Hazards>; 2] =

@@ -52,30 +52,31 @@ pub(crate) use boards::served::RemotePlatform;
 pub use error::PlatformError;
 pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use linux::dev_mem::DevMemWindows;
-pub use linux::fpga::{
-    FpgaManager, ManagerChoice, ZYNQMP_MANAGER, find_manager, fpga_managers, require_bitstream,
-};
+pub use linux::fpga::{FpgaManager, ManagerChoice, find_manager, fpga_managers, require_bitstream};
 pub use linux::lock::DeviceLock;
 pub use linux::system::{System, UIO_CLASS, try_node};
 pub use linux::uio::{NodePart, UioMap, UioNode};
 pub use linux::uio_device::UioDevice;
 pub use linux::uio_listing::{UioListing, UnreadableNode, uio_listing, uio_nodes};
 pub use linux::uio_window::UioWindow;
+pub use memory::Caching;
 pub(crate) use memory::DmaMemorySource;
 pub(crate) use memory::buffer::{BusAddress, CpuBuffer, DeviceBuffer, Reach, SharedWords};
 pub(crate) use memory::guard::GuardPlatform;
 pub use memory::reserved::ReservedMemory;
-pub use memory::u_dma_buf::{Caching, try_u_dma_buf, u_dma_buf_names};
+pub use memory::u_dma_buf::{try_u_dma_buf, u_dma_buf_names};
 pub(crate) use memory::volatile::{DmaMemory, SharedMemory};
 pub use registers::access_log::{AccessKind, RegisterAccess};
-pub(crate) use registers::window::{
-    AccessCounts, Decoded, RegisterMap, RegisterWindow, Window, fields,
-};
+pub(crate) use registers::map::{Decoded, RegisterMap, fields};
+pub(crate) use registers::window::{AccessCounts, RegisterWindow, Window};
 pub(crate) use wait::{Deadline, poll_until};
 #[cfg(test)]
 pub(crate) use {
     linux::fpga::fake as fpga_fake, linux::uio::fake as uio_fake, registers::window::fake,
 };
+
+/// The kernel's name for the manager of the chip's own logic.
+pub const ZYNQMP_MANAGER: &str = "Xilinx ZynqMP FPGA Manager";
 
 /// The device's use of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -148,7 +148,6 @@ fn tag_of(shape: u32, shapes: &[Shape]) -> u32 {
 /// Number of bodies that an index of sixteen bits can name.
 const LOW: usize = 1 << u16::BITS;
 const _: () = assert!(StreamFormat::Binary16.largest_index() as usize == LOW - 1);
-const _: () = assert!(StreamFormat::Thesis16.largest_index() as usize == LOW - 1);
 
 /// The ends of all bodies of a step. The table is kept, so that a step allocates nothing.
 #[derive(Default, PartialEq)]

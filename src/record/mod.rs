@@ -13,7 +13,6 @@ pub(crate) mod pose;
 pub(crate) mod result;
 pub(crate) mod sixteen;
 pub(crate) mod source;
-mod thesis16;
 pub(crate) mod velocity;
 
 use std::mem::offset_of;

@@ -2,8 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{CONTACT_POINTS, Collision, Collisions};
-use crate::simd::prefetch;
+use super::{CONTACT_POINTS, Collision};
 
 /// The impulses of a collision, accumulated over the passes of a step, N s.
 ///
@@ -58,42 +57,5 @@ impl Impulses {
         // Without a branch for each, as nearly all are.
         let of = |all: bool, impulse: &f32| all & (impulse.abs() <= limit);
         self.friction.iter().fold(self.normal.iter().fold(true, of), of)
-    }
-}
-
-/// Collisions with the impulses that a step is to begin with.
-#[derive(Debug, Clone, Copy)]
-pub struct WarmCollisions<'a, C: ?Sized> {
-    /// The collisions.
-    pub collisions: &'a C,
-    /// The impulses of each collision; a step refuses another number of them.
-    pub impulses: &'a [Impulses],
-}
-
-impl<C: Collisions + ?Sized> Collisions for WarmCollisions<'_, C> {
-    fn len(&self) -> usize {
-        self.collisions.len()
-    }
-
-    #[inline]
-    fn collision(&self, index: usize) -> Collision {
-        self.collisions.collision(index)
-    }
-
-    fn structures(&self) -> Option<super::Structures<'_>> {
-        self.collisions.structures()
-    }
-
-    fn prefetch(&self, index: usize) {
-        self.collisions.prefetch(index);
-        self.impulses.get(index).into_iter().for_each(prefetch);
-    }
-
-    fn lengths_agree(&self) -> bool {
-        self.collisions.lengths_agree() && self.impulses.len() == self.collisions.len()
-    }
-
-    fn impulses(&self, index: usize) -> Impulses {
-        self.impulses[index]
     }
 }

@@ -2,6 +2,7 @@
 
 mod body;
 mod collision;
+mod collisions;
 mod contact_memory;
 mod impulses;
 mod order;
@@ -12,9 +13,10 @@ mod structures;
 mod tangents;
 
 pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
-pub use collision::{CONTACT_POINTS, Collision, CollisionArrays, Collisions, Contact};
+pub use collision::{CONTACT_POINTS, Collision, Contact};
+pub use collisions::{CollisionArrays, Collisions, WarmCollisions};
 pub use contact_memory::ContactMemory;
-pub use impulses::{Impulses, WarmCollisions};
+pub use impulses::Impulses;
 pub use order::Order;
 pub use parameters::StepParameters;
 pub(crate) use passes::Passes;

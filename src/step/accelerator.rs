@@ -1,21 +1,12 @@
-//! The accelerator as a caller sees it, and the first half of a step.
-//!
-//! A step is five calls there and five back. [`Accelerator::submit`] checks, orders, reserves,
-//! packs (`pack.rs`) and starts; [`InFlight::wait`] waits, takes back, checks, reads and commits
-//! (`in_flight.rs`). The caller's bodies change in the last call, and only there.
+//! The accelerator as a caller sees it.
 
 use std::fmt;
-use std::sync::Arc;
 
 use pgs_support::float_env::standard;
 
+use super::flight::PackedStep;
 use super::impulses::ImpulsesOut;
-use super::in_flight::{Flight, InFlight, Started};
 use super::ordering::Ordering;
-use super::pack::{Engines, PackedStep};
-use super::report::StepReport;
-use super::retry::with_retries;
-use super::stopwatch::Stopwatch;
 use super::unique_id::UniqueId;
 use crate::beat::pack::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
@@ -24,9 +15,9 @@ use crate::board::device::Device;
 use crate::board::open::{self, BoardDescription, Found, OpenOptions};
 use crate::control_block::Capabilities;
 use crate::error::{Error, OpenError};
-use crate::platform::{Deadline, System};
+use crate::platform::System;
 use crate::record::result::Record;
-use crate::scene::{Bodies, Collisions, Impulses, Shape, StepParameters};
+use crate::scene::{Impulses, Shape};
 use crate::validate::{Limits, validate_shapes};
 
 /// Finds the board that the options ask for.
@@ -130,9 +121,9 @@ impl Accelerator {
     }
 
     /// Loads the shapes that bodies refer to by index, in place of all earlier ones. The
-    /// bitstream's table limits their number. A bitstream of world inertia with streamed masses (interface
-    /// 1.2) takes any number: each body then brings its own mass. A step that
-    /// was [prepared](InFlight::prepare) with the earlier shapes is refused from now on.
+    /// bitstream's table limits their number. A bitstream of world inertia with streamed masses takes any
+    /// number: each body then brings its own mass. A step that
+    /// was [prepared](super::InFlight::prepare) with the earlier shapes is refused from now on.
     ///
     /// # Errors
     /// [`Error::Input`]: a shape that the bitstream cannot take, or too many; the earlier shapes
@@ -158,95 +149,11 @@ impl Accelerator {
         self.device.cancellation = Some(cancellation);
     }
 
-    /// Solves the contacts of one time step and integrates it.
-    ///
-    /// The board takes the collisions in the [order](StepParameters::order) that the parameters ask
-    /// for. Static bodies stay as they are, unless they are [kinematic](StepParameters::kinematic). The bodies change only if the step succeeds, and then
-    /// all at once.
-    ///
-    /// Units: metres, kilograms, seconds, radians, world frame.
-    ///
-    /// # Errors
-    /// [`Error::Input`]: the input was refused and nothing was sent. [`Error::Step`]: a fault of
-    /// the board; [`Error::may_retry`] and [`Error::must_reopen`] say what to do.
-    /// [`Error::MustReopen`] after a fault that could not be cleared. [`Error::OtherProcess`] in a child
-    /// that was forked since the opening; so of every call.
-    pub fn step<B: Bodies + ?Sized, C: Collisions + ?Sized>(
-        &mut self,
-        bodies: &mut B,
-        collisions: &C,
-        parameters: &StepParameters,
-    ) -> Result<StepReport, Error> {
-        let counts = Arc::clone(&self.device.counts);
-        let (reads, writes) = (counts.reads(), counts.writes());
-        let (mut report, retries) = with_retries(parameters.retries, || {
-            self.submit(bodies, collisions, parameters)?.wait(bodies)
-        })?;
-        report.retries = retries;
-        report.register_reads = counts.reads() - reads;
-        report.register_writes = counts.writes() - writes;
-        Ok(report)
-    }
-
     /// The impulses of each collision, in the caller's order, of the last step that succeeded and
-    /// [gave them out](StepParameters::impulses_out); empty before the first. An empty collision has
+    /// [gave them out](crate::StepParameters::impulses_out); empty before the first. An empty collision has
     /// zeros.
     #[must_use]
     pub fn impulses(&self) -> &[Impulses] {
         &self.impulses.committed
-    }
-
-    /// Starts a [step](Self::step) and returns at once. The caller may do other work until it asks
-    /// for the results with [`InFlight::wait`].
-    ///
-    /// This call copies the bodies; only [`InFlight::wait`] touches them again.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn submit<B: Bodies + ?Sized, C: Collisions + ?Sized>(
-        &mut self,
-        bodies: &B,
-        collisions: &C,
-        parameters: &StepParameters,
-    ) -> Result<InFlight<'_>, Error> {
-        standard(move || {
-            self.settle()?;
-            let (mut watch, accesses) = (Stopwatch::start(), self.accesses());
-            let into = (self.bank, Engines::Idle);
-            let step = self.pack(into, bodies, collisions, parameters, &mut watch)?;
-            let flight = self.begin(step, watch, accesses)?;
-            Ok(InFlight::new(self, flight))
-        })
-    }
-
-    /// Register reads and writes so far.
-    pub(super) fn accesses(&self) -> (u64, u64) {
-        (self.device.counts.reads(), self.device.counts.writes())
-    }
-
-    /// Starts a step that lies in its bank, while no other is in flight.
-    pub(super) fn begin(
-        &mut self,
-        step: PackedStep,
-        watch: Stopwatch,
-        accesses: (u64, u64),
-    ) -> Result<Flight, Error> {
-        let PackedStep { plan, parameters, bank, .. } = &step;
-        let mut flight = Flight { step, started: None, watch, accesses };
-        self.bank = *bank;
-        if step.sent.is_some() {
-            let device = &mut self.device;
-            let limit = plan.deadline(parameters, &device.capabilities);
-            let deadline = Deadline::after(&*device.platform, limit);
-            let armed = device.arm(plan, *bank, parameters);
-            flight.step.host.start += flight.watch.lap();
-            let doorbells = armed
-                .and_then(|()| device.start())
-                .map_err(|symptom| device.fail(symptom, &self.shapes))?;
-            // From here on the board is at work.
-            flight.step.host.wait = flight.watch.lap();
-            flight.started = Some(Started { deadline, doorbells });
-        }
-        Ok(flight)
     }
 }

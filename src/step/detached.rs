@@ -3,7 +3,8 @@
 use std::mem::ManuallyDrop;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{Flight, InFlight};
+use super::flight::Flight;
+use super::in_flight::InFlight;
 use super::unique_id::UniqueId;
 use crate::error::Error;
 use crate::validate::InputError;

@@ -3,17 +3,15 @@
 use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
+use super::flight::{Flight, PackedStep, Started};
 use super::locate::locate;
-use super::pack::PackedStep;
 use super::report::{HostTimes, StepCycles, StepReport};
 use super::results::{check_received, commit, commit_velocities, impulses_of, read};
-use super::stopwatch::Stopwatch;
 use crate::board::symptom::Symptom;
 use crate::control_block::{Counters, Saturated};
 use crate::error::Error;
 use crate::fault::Fault;
 use crate::order::Schedule;
-use crate::platform::Deadline;
 use crate::scene::{Bodies, Impulses};
 use crate::validate::InputError;
 
@@ -30,24 +28,6 @@ use crate::validate::InputError;
 pub struct InFlight<'a> {
     pub(super) accelerator: &'a mut Accelerator,
     pub(super) flight: Flight,
-}
-
-/// The state of a step between its start and its end.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Flight {
-    pub(super) step: PackedStep,
-    /// `None` where no body moves, or there is none, and nothing is streamed.
-    pub(super) started: Option<Started>,
-    pub(super) watch: Stopwatch,
-    /// Register reads and writes before the step.
-    pub(super) accesses: (u64, u64),
-}
-
-/// The deadline and the doorbells of a step on the board.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Started {
-    pub(super) deadline: Deadline,
-    pub(super) doorbells: u64,
 }
 
 /// The counters of a step that has ended and whose results are back in their bank.

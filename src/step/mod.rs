@@ -3,6 +3,7 @@
 mod accelerator;
 mod detached;
 mod echo;
+mod flight;
 mod impulses;
 mod in_flight;
 mod locate;
@@ -15,6 +16,7 @@ mod reserve;
 mod results;
 mod retry;
 mod stopwatch;
+mod submit;
 #[cfg(all(test, feature = "emulation"))]
 mod tests;
 mod unique_id;

@@ -1,6 +1,7 @@
 //! Packs a step into a bank of buffers: check, order, reserve, pack.
 
 use super::accelerator::Accelerator;
+use super::flight::{Engines, PackedStep};
 use super::ordering::{OrderSummary, Ordering, OrderingContext};
 use super::packing::{PackInput, SentSums};
 use super::report::HostTimes;
@@ -15,40 +16,6 @@ use crate::error::Error;
 use crate::order::Ordered;
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::validate::{InputError, Limits, Quick, Scene, preflight, validate};
-
-/// A step whose records lie in a bank.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PackedStep {
-    /// Tells this packing from every other.
-    pub(super) id: UniqueId,
-    pub(super) bank: Bank,
-    pub(super) plan: Plan,
-    /// The sums of the words sent; `None` if no body moves, or there is none, and nothing is
-    /// streamed.
-    pub(super) sent: Option<SentSums>,
-    pub(super) parameters: StepParameters,
-    /// Number of the caller's bodies.
-    pub(super) bodies: usize,
-    /// Number of the caller's collisions.
-    pub(super) given: usize,
-    /// Number of them with contact points.
-    pub(super) collisions: usize,
-    /// Empty entries that are sent.
-    pub(super) empty: usize,
-    pub(super) order_summary: OrderSummary,
-    /// `Accelerator::shapes_loaded` at the time of packing.
-    pub(super) shapes_loaded: u64,
-    pub(super) host: HostTimes,
-}
-
-/// The state of the DMA engines while a step is packed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Engines {
-    /// Without work: they may be stopped and reset, and all memory but the bank's may be freed.
-    Idle,
-    /// At work on another step, which nothing may disturb.
-    Working,
-}
 
 /// The caller's arguments of a step, with the board's shapes and limits.
 struct Input<'a, B: ?Sized, C: ?Sized> {

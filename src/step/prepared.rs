@@ -8,8 +8,8 @@
 use pgs_support::float_env::standard;
 
 use super::accelerator::Accelerator;
-use super::in_flight::{Flight, InFlight};
-use super::pack::{Engines, PackedStep};
+use super::flight::{Engines, Flight, PackedStep};
+use super::in_flight::InFlight;
 use super::report::StepReport;
 use super::reserve::or_free;
 use super::stopwatch::Stopwatch;

@@ -1,6 +1,6 @@
 //! Reserves the memory of a step, and makes the error of a step that could not be packed.
 
-use super::pack::{Engines, PackedStep};
+use super::flight::{Engines, PackedStep};
 use crate::board::bank::{Bank, PerBank};
 use crate::board::device::Device;
 use crate::board::plan::Plan;

@@ -3,9 +3,9 @@
 use pgs_support::float_env::standard_around;
 
 use super::accelerator::Accelerator;
+use super::flight::{Engines, PackedStep};
 use super::in_flight::InFlight;
 use super::ordering::{OrderSummary, in_order_of_writing};
-use super::pack::{Engines, PackedStep};
 use super::prepared::Prepared;
 use super::report::{HostTimes, OrderChoice};
 use super::reserve::{refuse, reserve};

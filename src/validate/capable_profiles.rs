@@ -4,8 +4,6 @@ use std::fmt;
 
 use pgs_interface::profile::{Inertia, PROFILES, Profile, Variant};
 
-use super::{Excess, InputError};
-
 /// The profiles, built with their default formats, that take a refused scene: its refused value and
 /// its number of bodies and collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,19 +59,13 @@ pub(crate) struct SceneNeeds {
 }
 
 impl SceneNeeds {
-    /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
-    /// excess.
-    #[cold]
-    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
-        InputError::BeyondBitstream { excess, capable: self.capable(can) }
-    }
-
     /// The profiles that have room for the scene and satisfy `can`.
     pub(crate) fn capable(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
         for (at, profile) in PROFILES.iter().enumerate() {
             let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
-            profiles |= u32::from(self.has_room(&variant) && can(&variant)) << at;
+            let built = profile.inertias().contains(&self.inertia);
+            profiles |= u32::from(built && self.has_room(&variant) && can(&variant)) << at;
         }
         CapableProfiles { profiles, inertia: self.inertia }
     }
@@ -128,8 +120,9 @@ mod tests {
         // 4 MiB: 16 bytes a collision in f32, 8 in half.
         let collisions = |collisions| SceneNeeds { collisions, ..SMALL };
         assert_eq!(names(collisions(300_000), |_| true), ["half"]);
-        // 48 bytes a body with world inertia in f32, 36 in half.
-        let world = SceneNeeds { bodies: 60_000, collisions: 100_000, inertia: Inertia::World };
-        assert_eq!(names(world, |_| true), ["half"]);
+        // 48 bytes a body with world inertia, which half and naive are not built with.
+        let world = |bodies| SceneNeeds { bodies, collisions: 100_000, inertia: Inertia::World };
+        assert_eq!(names(world(50_000), |_| true), ["float"]);
+        assert_eq!(names(world(60_000), |_| true), [""; 0]);
     }
 }

@@ -1,9 +1,11 @@
 //! The reasons for which a step refuses its input, before anything is sent.
 
-use super::{CapableProfiles, Excess, OutOfRange};
+use pgs_interface::profile::Variant;
+use pgs_interface::record::CONTACT_POINTS;
+
+use super::{CapableProfiles, Excess, OutOfRange, SceneNeeds};
 use crate::order::OrderError;
 use crate::scene::ShapeError;
-use pgs_interface::record::CONTACT_POINTS;
 
 /// Why input was refused. Nothing was sent, and the caller's data is unchanged.
 ///
@@ -383,4 +385,13 @@ impl InputError {
     pub const NORMAL_TOLERANCE: f32 = 1e-3;
     /// The most iterations of each solver.
     pub const MAX_ITERATIONS: u32 = pgs_interface::control::ITERATIONS_MAX;
+}
+
+impl SceneNeeds {
+    /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
+    /// excess.
+    #[cold]
+    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
+        InputError::BeyondBitstream { excess, capable: self.capable(can) }
+    }
 }

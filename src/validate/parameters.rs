@@ -9,9 +9,6 @@ use crate::scene::StepParameters;
 
 const TIME_STEP: &str = "time step";
 
-/// Whether the records of a bitstream hold what a step asks for.
-type Holds = fn(&Variant) -> bool;
-
 /// Checks the step parameters against their ranges, and against the bitstream's arithmetic.
 pub(crate) fn check_parameters(
     parameters: &StepParameters,
@@ -52,16 +49,9 @@ pub(crate) fn check_parameters(
             return Err(InputError::Parameter { parameter, found, expected });
         }
     }
-    let asked = [
-        ("static bodies that move", parameters.kinematic, Variant::has_kinematic as Holds),
-        ("a friction for each collision", parameters.pair_friction, Variant::has_pair_friction),
-        ("a warm start", parameters.warm_start, Variant::has_impulses),
-        ("the impulses of the collisions", parameters.impulses_out, Variant::has_impulses),
-    ];
-    for (asked, wanted, holds) in asked {
-        if wanted && !holds(&limits.variant) {
-            return Err(needs.refuse(Excess::NotInRecords { asked }, holds));
-        }
+    if parameters.pair_friction && !limits.variant.has_pair_friction() {
+        let excess = Excess::NotInRecords { asked: "a friction for each collision" };
+        return Err(needs.refuse(excess, Variant::has_pair_friction));
     }
     if computes_short(&limits.variant.numbers) {
         let (format, component) = (StreamFormat::Binary16, 0);

@@ -67,7 +67,7 @@ pub(crate) fn check_impulses(
     let item = InputItem::Collision(index, None);
     let number = OutOfRange { item, field, component, found, format, smallest: 0.0, largest };
     Err(scene.needs.refuse(Excess::OutOfRange(number), |variant| {
-        variant.has_impulses() && impulses.are_within(largest_impulse(&variant.numbers))
+        impulses.are_within(largest_impulse(&variant.numbers))
     }))
 }
 
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn the_narrowest_place_on_the_way_decides() {
-        use StreamFormat::{Binary16, F32, Thesis16};
+        use StreamFormat::{Binary16, F32};
         let held = |numbers: &Numbers| {
             let Held { poses, velocities, collisions, .. } = Held::by(numbers);
             (poses, velocities, collisions)
@@ -281,8 +281,5 @@ mod tests {
         assert_eq!(with(Numbers { updates: short, ..Numbers::F32 }), (F32, Binary16, F32));
         assert_eq!(with(Numbers { rows: short, ..Numbers::F32 }), (F32, F32, Binary16));
         assert_eq!(with(Numbers { impulses: short, ..Numbers::F32 }), (F32, F32, F32));
-        let thesis =
-            Numbers { collisions: Thesis16, bodies: Thesis16, poses: Thesis16, ..HALF.numbers };
-        assert_eq!(held(&thesis), (Thesis16, Thesis16, Thesis16));
     }
 }

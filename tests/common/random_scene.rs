@@ -52,6 +52,11 @@ pub(crate) fn shapes() -> [Shape; 5] {
     ]
 }
 
+/// The shapes with the same inertia about every axis.
+pub(crate) fn round_shapes() -> [Shape; 5] {
+    shapes().map(|shape| Shape::isotropic(shape.inverse_mass, shape.inverse_inertia[0]))
+}
+
 pub(crate) fn scene(seed: u64) -> (Vec<Body>, Vec<Collision>) {
     let mut random = Random(SplitMix64::new(seed));
     let mut bodies = vec![at_rest([0.0, -50.0, 0.0], 0)];

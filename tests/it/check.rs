@@ -3,7 +3,7 @@
 #![cfg(feature = "emulation")]
 
 use bitstream_model::interface::fence::Fence;
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::number::{Numbers, Precision};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, PROFILES};
 use bitstream_model::{
     BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Master, Quirks, Resettable,
@@ -192,21 +192,15 @@ fn boards_of_other_builds_pass_too() {
 
 #[test]
 fn boards_of_every_profile_pass_every_line() {
-    let thesis16 = Numbers {
-        collisions: StreamFormat::Thesis16,
-        bodies: StreamFormat::Thesis16,
-        ..Numbers::BINARY16
-    };
     // Arrays of sixteen bits behind streams of thirty-two.
     let short = Numbers { velocities: Precision::Binary16, ..FLOAT.numbers };
     let mut configs = Vec::new();
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
+        for inertia in profile.inertias().iter().copied() {
             configs.push(BoardConfig { profile, inertia, ..BoardConfig::default() });
         }
     }
     configs.extend([
-        BoardConfig { profile: &HALF, numbers: Some(thesis16), ..BoardConfig::default() },
         BoardConfig { numbers: Some(short), ..BoardConfig::default() },
         BoardConfig {
             profile: &HALF,

@@ -9,8 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common;
 use crate::common::bits;
-use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, PROFILES, Profile};
+use bitstream_model::interface::profile::{FLOAT, Inertia, PROFILES, Profile};
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 use scene::{Scene, SceneOptions};
@@ -18,14 +17,6 @@ use zynq_pgs::order::{InputBuffers, IssueWindow, Order, OrderInput, Orderer};
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, OpenOptions, Pose, Shape,
     StepParameters, StepReport, Velocity, Writer, check,
-};
-
-/// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
-const THESIS16: Numbers = Numbers {
-    collisions: StreamFormat::Thesis16,
-    bodies: StreamFormat::Thesis16,
-    poses: StreamFormat::Thesis16,
-    ..Numbers::F32
 };
 
 /// Number of bodies and collisions from which several threads share the work.
@@ -148,12 +139,7 @@ fn a_step_is_the_same_in_every_environment_on_every_profile() {
 
 #[test]
 fn a_step_with_world_inertia_is_the_same_in_every_environment() {
-    PROFILES.iter().for_each(|profile| same_everywhere(of(profile, Inertia::World)));
-}
-
-#[test]
-fn a_step_in_the_sixteen_bits_of_the_thesis_is_the_same_in_every_environment() {
-    same_everywhere(BoardConfig { numbers: Some(THESIS16), ..of(&HALF, Inertia::Isotropic) });
+    same_everywhere(of(&FLOAT, Inertia::World));
 }
 
 /// Runs four steps: one, a second that is prepared while the first is on the board, one that is

@@ -4,20 +4,11 @@
 
 use crate::common::{at_rest, bits, open, ordered, standing};
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::number::{Numbers, StreamFormat};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Profile};
 use scene::{Scene, SceneOptions};
 use zynq_pgs::order::Order;
 use zynq_pgs::{
     Aftermath, Body, Collision, Contact, Error, Fault, Shape, StepParameters, StepReport, Velocity,
-};
-
-/// Sixteen bits on every stream as the thesis has them, arithmetic in f32.
-const THESIS16: Numbers = Numbers {
-    collisions: StreamFormat::Thesis16,
-    bodies: StreamFormat::Thesis16,
-    poses: StreamFormat::Thesis16,
-    ..Numbers::F32
 };
 
 fn of(profile: &'static Profile) -> BoardConfig {
@@ -75,11 +66,9 @@ fn naive_gives_the_bits_of_float() {
 /// Cubes are the same about any axes: the tensors' zeros change no number but the sign of a zero.
 #[test]
 fn world_inertia_changes_nothing_for_cubes() {
-    for profile in [&NAIVE, &FLOAT] {
-        let world = BoardConfig { inertia: Inertia::World, ..of(profile) };
-        let (position, velocity) = difference(&step(world).bodies, &step(of(profile)).bodies);
-        assert!(position == 0.0 && velocity == 0.0, "{}: {position} {velocity}", profile.name);
-    }
+    let world = BoardConfig { inertia: Inertia::World, ..of(&FLOAT) };
+    let (position, velocity) = difference(&step(world).bodies, &step(of(&FLOAT)).bodies);
+    assert!(position == 0.0 && velocity == 0.0, "{position} {velocity}");
 }
 
 /// The pile stands within 8 m of the origin and lands at 1 m/s.
@@ -94,8 +83,6 @@ fn sixteen_bits_stay_near_float() {
     };
     // Positions in binary16 are rounded by half of 2^-8 m at 4 to 8 m, on input and on output.
     near(of(&HALF), 4e-3, 1e-2);
-    // Cut off: 2^-8 m each time.
-    near(BoardConfig { numbers: Some(THESIS16), ..of(&HALF) }, 8e-3, 5e-2);
 }
 
 /// Bytes by hand from the record table and the stripes, 16 a beat: B bodies, C collisions.
@@ -127,7 +114,7 @@ fn a_step_costs_the_bytes_and_doorbells_of_its_profile() {
 #[test]
 fn any_number_of_bodies_and_collisions_goes_through_every_profile() {
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
+        for inertia in profile.inertias().iter().copied() {
             let (board, mut accelerator) = open(BoardConfig { inertia, ..of(profile) });
             accelerator
                 .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
@@ -187,10 +174,6 @@ fn a_value_beyond_the_format_is_refused_with_the_profiles_that_could() {
         "body 2: position[0] is 70000, but this bitstream holds bodies in binary16, which ends at \
          65504: bring it into range, or load another (profiles that could: naive, float)"
     );
-    let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF) };
-    assert!(
-        refused(thesis, &mut bodies, &collisions).contains("bodies in thesis16, which ends at")
-    );
 }
 
 /// A contact far out on a body: 1 + 0.4 x 380^2 = 57,761, and with 410 m 67,241.
@@ -248,55 +231,25 @@ fn counts_beyond_indices_and_memory_are_refused_with_the_profiles_that_could() {
     assert!(text.ends_with("(profiles that could: half)"), "{text}");
 }
 
-/// The encoder cuts three bits out of the exponent: a number too small for the format becomes large.
-#[test]
-#[expect(clippy::float_cmp, reason = "the values are exact")]
-fn taken_literally_the_format_of_the_thesis_makes_small_numbers_large() {
-    let literal = StreamFormat::Thesis16Literal;
-    let numbers = Numbers { collisions: literal, bodies: literal, poses: literal, ..THESIS16 };
-    let after = |numbers| {
-        let (_, mut accelerator) = open(BoardConfig { numbers: Some(numbers), ..of(&HALF) });
-        let shapes = [Shape::STATIC, Shape::isotropic(1.0, 0.4)];
-        accelerator.set_shapes(&shapes).expect("shapes that fit");
-        let mut bodies = vec![at_rest([1.0, 2.0, 4.0], 1)];
-        let tiny = [2.0_f32.powi(-16), -2.0_f32.powi(-20), -0.75 * 2.0_f32.powi(-15)];
-        bodies[0].velocity.linear = tiny;
-        // The caller moves the bodies: poses stay, and velocities come back as they went in.
-        let parameters = StepParameters::default().with_gravity([0.0; 3]).with_integrate(false);
-        let none: &[Collision] = &[];
-        accelerator.step(&mut bodies, none, &parameters).expect("numbers that the format carries");
-        bodies[0].velocity.linear
-    };
-    let smallest = 2.0_f32.powi(-15);
-    assert_eq!(after(THESIS16), [smallest, -smallest, -smallest]);
-    // 2^-16 and 1.5 x 2^-16 have the exponent of 1, 2^-20 has the one of 2^-4.
-    assert_eq!(after(numbers), [1.0, -0.0625, -1.5]);
-}
-
-/// A result beyond 65,504 comes back as infinity (binary16) or F = 31 (thesis16).
+/// A result beyond 65,504 comes back as infinity.
 #[test]
 fn results_that_sixteen_bits_cannot_hold_are_a_fault_and_change_nothing() {
-    let configs = [of(&HALF), BoardConfig { numbers: Some(THESIS16), ..of(&HALF) }];
-    for config in configs {
-        let (board, mut accelerator) = open(config);
-        accelerator
-            .set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)])
-            .expect("shapes that fit");
-        let (mut bodies, _) = row(3);
-        bodies[2].velocity.linear[0] = 65_400.0;
-        let before = bits(&bodies);
-        // A sixtieth of 60,000 m/s² is 1,000 m/s.
-        let parameters = StepParameters::default();
-        let none: &[Collision] = &[];
-        let mut hard = parameters;
-        hard.gravity = [60_000.0, 0.0, 0.0];
-        let error = accelerator.step(&mut bodies, none, &hard).expect_err("66,400 m/s");
-        let Error::Step { fault, aftermath: Aftermath::Untouched, .. } = &error else {
-            panic!("{error}")
-        };
-        assert!(matches!(**fault, Fault::NotFinite { body: 2 }), "{fault}");
-        assert!(bits(&bodies) == before);
-        accelerator.step(&mut bodies, none, &parameters).expect("within range");
-        assert_eq!(board.violations(), []);
-    }
+    let (board, mut accelerator) = open(of(&HALF));
+    accelerator.set_shapes(&[Shape::STATIC, Shape::isotropic(1.0, 0.4)]).expect("shapes that fit");
+    let (mut bodies, _) = row(3);
+    bodies[2].velocity.linear[0] = 65_400.0;
+    let before = bits(&bodies);
+    // A sixtieth of 60,000 m/s² is 1,000 m/s.
+    let parameters = StepParameters::default();
+    let none: &[Collision] = &[];
+    let mut hard = parameters;
+    hard.gravity = [60_000.0, 0.0, 0.0];
+    let error = accelerator.step(&mut bodies, none, &hard).expect_err("66,400 m/s");
+    let Error::Step { fault, aftermath: Aftermath::Untouched, .. } = &error else {
+        panic!("{error}")
+    };
+    assert!(matches!(**fault, Fault::NotFinite { body: 2 }), "{fault}");
+    assert!(bits(&bodies) == before);
+    accelerator.step(&mut bodies, none, &parameters).expect("within range");
+    assert_eq!(board.violations(), []);
 }

@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
 """Prints which rooms of a crate use which, and fails where two use each other, directly or through others.
 
-usage: circles.py [FOLDER...]      source folders of crates; src and bitstream-model/src if none
+usage: circles.py [--files] [FOLDER...]      source folders of crates; src and bitstream-model/src if none
+
+--files prints the circles of files instead: an arrow leads to the file that has the named item, through
+every `use` that passes it on. A file and the modules inside of it make no circle.
 
 A room is a module directly below lib.rs: a folder or a file. An arrow is a path `crate::room::...`,
 `super::...` or `self::...` that leads from a file of one room into another room. A name that lib.rs
@@ -224,6 +227,41 @@ class Crate:
                     yield Arrow(module[0], target, place)
 
 
+    def files(self) -> dict[str, set[str]]:
+        """The files that each file uses, by their paths below the crate."""
+        files = {self.module(path): path for path in self.code}
+        passed_on: dict[tuple[str, ...], dict[str, list[str]]] = defaultdict(dict)
+        for module, path in files.items():
+            for found in re.finditer(r"\buse\b([^;<]*);", self.code[path]):
+                for names, name in leaves(found.group(1)):
+                    passed_on[module][name] = names
+
+        def home(module: tuple[str, ...], names: list[str], seen: int = 0) -> tuple[str, ...] | None:
+            ups = 0
+            while ups < len(names) and names[ups] in ("super", "self", "crate"):
+                ups += 1
+            levels = names[:ups].count("super")
+            base = () if names[0] == "crate" else module[: len(module) - levels]
+            rest = names[ups:]
+            while rest and (*base, rest[0]) in files:
+                base, rest = (*base, rest[0]), rest[1:]
+            further = passed_on[base].get(rest[0]) if rest else None
+            if further and further != names and seen < 9:
+                return home(base, [*further, *rest[1:]], seen + 1)
+            return base if base in files else None
+
+        uses: dict[str, set[str]] = {}
+        for module, path in files.items():
+            found = {home(here, names) for here, names, _ in self.paths(path)}
+            apart = {
+                other
+                for other in found
+                if other is not None and other[: len(module)] != module and module[: len(other)] != other
+            }
+            uses["/".join(module)] = {"/".join(other) for other in apart}
+        return uses
+
+
 def circles(uses: dict[str, set[str]]) -> list[list[str]]:
     """The rooms that reach each other, by groups."""
 
@@ -277,10 +315,23 @@ def check(folder: Path) -> bool:
     return not groups and not lost
 
 
+def check_files(folder: Path) -> bool:
+    """Prints the circles of a crate's files; whether it has none."""
+    uses = Crate(folder).files()
+    groups = circles(uses)
+    for group in groups:
+        print(f"{shown(folder)}: circle of {len(group)} files: {', '.join(group)}")
+        for file in group:
+            print(f"  {file} -> {', '.join(sorted(uses[file] & set(group)))}")
+    return not groups
+
+
 def main(arguments: list[str]) -> int:
     if "--help" in arguments or "-h" in arguments:
         print(__doc__.strip())
         return 0
+    of_files = "--files" in arguments
+    arguments = [argument for argument in arguments if argument != "--files"]
     repository = Path(__file__).resolve().parents[2]
     folders = [Path(name) for name in arguments or ("src", "bitstream-model/src")]
     passed = True
@@ -289,7 +340,7 @@ def main(arguments: list[str]) -> int:
         if not (base / "lib.rs").exists():
             print(f"{folder}: no lib.rs", file=sys.stderr)
             return 2
-        passed &= check(base)
+        passed &= check_files(base) if of_files else check(base)
     if not passed:
         print("expected no circle: move the shared type down, or the caller up", file=sys.stderr)
     return int(not passed)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds tools/clients/rapier, which no other build compiles, and runs Rapier's scenes on both solvers.
 #
-# usage: rapier-client.sh [ARGUMENT...]     arguments of rapier-client, such as --board emulated:naive,world pile
+# usage: rapier-client.sh [ARGUMENT...]     arguments of rapier-client, such as --board emulated:float,world,threads=1 pile
 #
 # Exit code: 0 done, 1 a limit does not hold, a test fails or something does not build, 2 wrong usage,
 # 77 skipped: not on this machine.

@@ -11,35 +11,18 @@ pub enum StreamFormat {
     F32 = 0,
     /// IEEE 754 binary16, rounded to nearest even.
     Binary16 = 1,
-    /// The thesis' own sixteen bits (§4.6.4): sign, the top and the four low bits of the exponent
-    /// and the ten top bits of the mantissa of an f32, cut off.
-    ///
-    /// With F the five exponent bits, a word means (1 + mantissa / 1024) x 2^(F - 15) for every F:
-    /// on 2^-14 up to 2^16 this is binary16 rounded toward zero, but there is no zero, no
-    /// subnormal, no infinity. The encoder saturates: a smaller magnitude, zero among them,
-    /// becomes the word 0 with its sign, which reads as 2^-15; a magnitude of 2^16 or more,
-    /// infinity and NaN become F = 31.
-    Thesis16 = 2,
-    /// [`Thesis16`](Self::Thesis16) with the encoder taken literally: it cuts three bits out of the
-    /// exponent whatever they are. Words are read alike.
-    ///
-    /// A word keeps the top bit and the four low bits of the biased exponent. From 2^-15 up to 2^17
-    /// the format has the words of thesis16. A magnitude below 2^-15 reads as a number from 2^-15 up
-    /// to 2: 2^-16 reads as 1, zero as 2^-15. A magnitude of 2^17 or more reads as a number from 2 up
-    /// to 2^16, or as overflow (F = 31).
-    Thesis16Literal = 3,
 }
 
 impl StreamFormat {
     /// All formats.
-    pub const ALL: [Self; 4] = [Self::F32, Self::Binary16, Self::Thesis16, Self::Thesis16Literal];
+    pub const ALL: [Self; 2] = [Self::F32, Self::Binary16];
 
     /// Bits of a word.
     #[must_use]
     pub const fn bits(self) -> u32 {
         match self {
             Self::F32 => 32,
-            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 16,
+            Self::Binary16 => 16,
         }
     }
 
@@ -55,8 +38,7 @@ impl StreamFormat {
     pub const fn largest(self) -> f32 {
         match self {
             Self::F32 => f32::MAX,
-            // 0x7BFF; in thesis16 the next word, 65536, reads as overflow.
-            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 65_504.0,
+            Self::Binary16 => 65_504.0,
         }
     }
 
@@ -65,14 +47,8 @@ impl StreamFormat {
     pub const fn largest_index(self) -> u32 {
         match self {
             Self::F32 => u32::MAX,
-            Self::Binary16 | Self::Thesis16 | Self::Thesis16Literal => 0xFFFF,
+            Self::Binary16 => 0xFFFF,
         }
-    }
-
-    /// Whether the format has words for zero and for infinity, as IEEE 754 has them.
-    #[must_use]
-    pub const fn has_zero_and_infinity(self) -> bool {
-        matches!(self, Self::F32 | Self::Binary16)
     }
 
     /// Name on the command line and in reports.
@@ -81,8 +57,6 @@ impl StreamFormat {
         match self {
             Self::F32 => "f32",
             Self::Binary16 => "binary16",
-            Self::Thesis16 => "thesis16",
-            Self::Thesis16Literal => "thesis16-literal",
         }
     }
 }

@@ -211,10 +211,10 @@ impl Registers {
             contact_iterations: self.argument(CONTACT_ITERATIONS.offset),
             friction_iterations: self.argument(FRICTION_ITERATIONS.offset),
             integrate: flags::INTEGRATE.is_set(set),
-            kinematic: variant.has_kinematic() && flags::KINEMATIC.is_set(set),
+            kinematic: flags::KINEMATIC.is_set(set),
             streamed_masses: variant.has_streamed_masses() && flags::STREAMED_MASSES.is_set(set),
-            warm_start: variant.has_impulses() && flags::WARM_START.is_set(set),
-            impulses_out: variant.has_impulses() && flags::IMPULSES_OUT.is_set(set),
+            warm_start: flags::WARM_START.is_set(set),
+            impulses_out: flags::IMPULSES_OUT.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),

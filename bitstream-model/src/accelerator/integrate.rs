@@ -10,8 +10,8 @@ use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
 /// Position and orientation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
-    pub(super) position: [f32; 3],
-    pub(super) orientation: [f32; 4],
+    pub(crate) position: [f32; 3],
+    pub(crate) orientation: [f32; 4],
 }
 
 /// Parameters of the integration.

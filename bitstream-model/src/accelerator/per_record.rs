@@ -93,7 +93,7 @@ impl Accelerator {
                 beat: register(body),
             });
         };
-        // The words of a static body are ignored: thesis16 has none for 0.
+        // The words of a static body are ignored.
         let of_shape = || self.registers.shapes()[usize::from(shape)].inverse_mass;
         let inverse_mass = streamed.unwrap_or_else(of_shape);
         let moves = inverse_mass != 0.0;
@@ -171,9 +171,7 @@ impl Accelerator {
         let precision = match numbers.poses {
             // A position in f32 moves by less than a binary16 step.
             StreamFormat::F32 => Precision::F32,
-            StreamFormat::Binary16 | StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
-                numbers.updates
-            }
+            StreamFormat::Binary16 => numbers.updates,
         };
         let step = match (precision, self.config.subnormals) {
             (Precision::F32, Subnormals::Keep) => integrate::<Single>,

@@ -330,15 +330,13 @@ impl Accelerator {
     /// The next collision.
     #[inline]
     pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
-        use StreamFormat::{Binary16, F32, Thesis16, Thesis16Literal};
+        use StreamFormat::{Binary16, F32};
         match self.variant.numbers.collisions {
             F32 if self.arguments.solver.pair_friction => {
                 Collision::with_friction(&reader.record())
             }
             F32 => Collision::of(F32, &reader.record()),
             Binary16 => Collision::of(Binary16, &reader.record()),
-            // Words of both are read alike.
-            Thesis16 | Thesis16Literal => Collision::of(Thesis16, &reader.record()),
         }
     }
 

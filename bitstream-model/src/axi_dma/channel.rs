@@ -1,7 +1,7 @@
 //! Models the registers of one DMA channel, with the effects of reads and writes.
 
 use super::Build;
-use super::faults::FaultEffects;
+use super::effects::FaultEffects;
 use crate::cast::{high, low, register};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};

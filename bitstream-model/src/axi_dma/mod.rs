@@ -8,6 +8,7 @@
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
 mod channel;
+mod effects;
 mod faults;
 mod mover;
 mod undisturbed;

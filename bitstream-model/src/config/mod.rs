@@ -202,14 +202,11 @@ pub enum ConfigError {
         /// Bits of the profile's format.
         expected: u32,
     },
-    /// World inertia in a format without zero, which static bodies need.
-    #[error(
-        "world inertia in {format}, which has no zero for the inverse inertia of a static body; \
-         expected f32 or binary16"
-    )]
-    NoZero {
-        /// The format of the bodies.
-        format: &'static str,
+    /// World inertia on a profile that is built without it.
+    #[error("expected isotropic inertia on {profile}, found world inertia: take float")]
+    NoWorldInertia {
+        /// Name of the profile.
+        profile: &'static str,
     },
     /// Constraint rows of higher precision than the updates that use them.
     #[error(
@@ -336,8 +333,8 @@ impl BoardConfig {
                 return Err(ConfigError::StreamFormat { stream, found, expected });
             }
         }
-        if self.inertia == Inertia::World && !asked.bodies.has_zero_and_infinity() {
-            return Err(ConfigError::NoZero { format: asked.bodies.name() });
+        if !self.profile.inertias().contains(&self.inertia) {
+            return Err(ConfigError::NoWorldInertia { profile: self.profile.name });
         }
         if (asked.rows, asked.updates) == (Precision::F32, Precision::Binary16) {
             return Err(ConfigError::RowsBeyondUpdates);

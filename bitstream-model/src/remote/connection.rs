@@ -11,7 +11,19 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use super::passing::send_file;
-use pgs_interface::message::{ANSWER_BYTES, REQUEST_BYTES};
+use pgs_interface::message::{ANSWER_BYTES, REQUEST_BYTES, RequestError};
+
+/// How a visit ended.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Ended {
+    /// The driver closed the socket, or was killed.
+    Left,
+    /// It sent bytes that are not a request.
+    Refused(RequestError),
+    /// The socket failed, or a request was not complete in time.
+    Broken(io::Error),
+}
 
 /// A connection, and the bytes of its next request that have arrived.
 #[derive(Debug)]

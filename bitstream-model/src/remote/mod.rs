@@ -22,7 +22,8 @@ mod server;
 mod visit;
 
 pub use connect::connect;
+pub use connection::Ended;
 pub use memory::{MemoryError, SEALS};
 pub use passing::{receive_files, send_file};
 pub use server::{ServeError, Server, Stopper};
-pub use visit::{Ended, Visit};
+pub use visit::Visit;

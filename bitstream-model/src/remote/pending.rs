@@ -9,8 +9,7 @@ use std::time::{Duration, Instant};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags};
 
-use super::connection::{Connection, Presence, late, wait};
-use super::visit::Ended;
+use super::connection::{Connection, Ended, Presence, late, wait};
 use pgs_interface::message::{Answer, Request, Status, VERSION};
 
 /// Time limit of a driver for its first request and its next, for the rest of a request that has

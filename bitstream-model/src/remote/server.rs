@@ -17,9 +17,10 @@ use pgs_support::Process;
 use thiserror::Error;
 
 use super::connect::connect;
+use super::connection::Ended;
 use super::memory::{Memories, MemoryError};
 use super::pending::{Caller, PendingConnections};
-use super::visit::{Ended, Session, Visit};
+use super::visit::{Session, Visit};
 use crate::config::{BoardConfig, ConfigError};
 use crate::external::ExternalAccelerator;
 use crate::handle::EmulatedBoard;

@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use super::connection::{Connection, Presence, late};
+use super::connection::{Connection, Ended, Presence, late};
 use super::memory::{Memories, MemoryError};
 use super::pending::PendingConnections;
 use crate::handle::{CpuPort, EmulatedBoard};
@@ -14,18 +14,6 @@ use pgs_interface::message::{
 
 /// Virtual time between two checks whether the driver is still there.
 const SLICE: Duration = Duration::from_micros(20);
-
-/// How a visit ended.
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum Ended {
-    /// The driver closed the socket, or was killed.
-    Left,
-    /// It sent bytes that are not a request.
-    Refused(RequestError),
-    /// The socket failed, or a request was not complete in time.
-    Broken(io::Error),
-}
 
 /// A driver's use of the board, from its hello until it was gone.
 #[derive(Debug)]

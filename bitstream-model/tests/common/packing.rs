@@ -17,25 +17,6 @@ pub(crate) fn encode(format: StreamFormat, value: f32) -> u32 {
     match format {
         StreamFormat::F32 => value.to_bits(),
         StreamFormat::Binary16 => f16::from_f32(value).to_bits().into(),
-        StreamFormat::Thesis16 => {
-            let bits = value.to_bits();
-            let sign = (bits >> 31) << 15;
-            let magnitude = value.abs();
-            if magnitude < 2.0_f32.powi(-15) {
-                return sign;
-            }
-            if magnitude >= 131_072.0 || magnitude.is_nan() {
-                return sign | 0x7FFF;
-            }
-            // The top bit of the exponent, its four low bits, the ten top bits of the mantissa.
-            let (top, low) = (bits >> 30 & 1, bits >> 23 & 0xF);
-            sign | (top << 14) | (low << 10) | (bits >> 13 & 0x3FF)
-        }
-        StreamFormat::Thesis16Literal => {
-            let [sign, top] = [value.to_bits() >> 31, value.to_bits() >> 30 & 1];
-            let low = value.to_bits() >> 23 & 0xF;
-            (sign << 15) | (top << 14) | (low << 10) | (value.to_bits() >> 13 & 0x3FF)
-        }
     }
 }
 
@@ -45,11 +26,6 @@ pub(crate) fn decode(format: StreamFormat, word: u32) -> f32 {
     match format {
         StreamFormat::F32 => f32::from_bits(word),
         StreamFormat::Binary16 => f16::from_bits(half()).to_f32(),
-        StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => {
-            let sign = if half() >> 15 == 0 { 1.0 } else { -1.0 };
-            let exponent = i32::from(half() >> 10 & 31) - 15;
-            sign * (1.0 + f32::from(half() & 0x3FF) / 1024.0) * 2.0_f32.powi(exponent)
-        }
     }
 }
 

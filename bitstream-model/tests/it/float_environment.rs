@@ -4,21 +4,12 @@
 #![allow(clippy::print_stdout, reason = "what is skipped is said")]
 
 use bitstream_model::BoardConfig;
-use pgs_interface::number::{Numbers, StreamFormat};
-use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile};
+use pgs_interface::profile::{PROFILES, Profile};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 
 use crate::common::scene::{AT_REST, Body, Step};
 use crate::common::sg::Machine;
 use crate::common::shortcuts::{Visible, scene, visible};
-
-/// The thesis' sixteen bits on every stream, arithmetic in f32.
-const THESIS16: Numbers = Numbers {
-    collisions: StreamFormat::Thesis16,
-    bodies: StreamFormat::Thesis16,
-    poses: StreamFormat::Thesis16,
-    ..Numbers::F32
-};
 
 fn boards() -> impl Iterator<Item = BoardConfig> {
     let of = |profile: &'static Profile, inertia| BoardConfig {
@@ -26,9 +17,9 @@ fn boards() -> impl Iterator<Item = BoardConfig> {
         inertia,
         ..BoardConfig::default()
     };
-    let both = move |&profile| [Inertia::Isotropic, Inertia::World].map(|i| of(profile, i));
-    let thesis = BoardConfig { numbers: Some(THESIS16), ..of(&HALF, Inertia::Isotropic) };
-    PROFILES.iter().flat_map(both).chain([thesis])
+    let both =
+        move |&profile: &&'static Profile| profile.inertias().iter().map(move |i| of(profile, *i));
+    PROFILES.iter().flat_map(both)
 }
 
 /// Numbers that have to be rounded, and every ninth body so slow that its velocity is subnormal: a

@@ -23,15 +23,9 @@ fn config(profile: &'static Profile) -> BoardConfig {
 fn variants() -> Vec<Variant> {
     let mut variants = Vec::new();
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
-            let own = profile.numbers;
-            variants.push(Variant { profile, numbers: own, inertia });
-        }
-    }
-    for thesis in [StreamFormat::Thesis16, StreamFormat::Thesis16Literal] {
-        let numbers =
-            Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
-        variants.push(Variant { profile: &HALF, numbers, inertia: Inertia::Isotropic });
+        let own = profile.numbers;
+        let built = profile.inertias().iter();
+        variants.extend(built.map(|inertia| Variant { profile, numbers: own, inertia: *inertia }));
     }
     let numbers = Numbers { collisions: StreamFormat::Binary16, ..Numbers::F32 };
     let half = StreamFormat::Binary16;
@@ -60,9 +54,6 @@ fn states(outcome: &Outcome) -> Vec<[[u32; 4]; 4]> {
 #[test]
 fn bodies_fall_alike_on_every_profile_whatever_their_number() {
     for variant in variants() {
-        if !variant.numbers.bodies.has_zero_and_infinity() {
-            continue;
-        }
         let mut machine = unlimited(&variant);
         for bodies in (1..14).chain([100]) {
             let outcome = machine.step(&Step::falling(bodies)).expect("the step completes");
@@ -77,9 +68,6 @@ fn bodies_fall_alike_on_every_profile_whatever_their_number() {
 #[test]
 fn masses_on_the_ground_stop_alike_on_every_profile_whatever_their_number() {
     for variant in variants() {
-        if !variant.numbers.bodies.has_zero_and_infinity() {
-            continue;
-        }
         for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
             let config = BoardConfig { hazards, ..config(variant.profile) };
             let mut machine = built(&variant, config);
@@ -330,9 +318,6 @@ fn unchecked_a_write_back_is_seen_from_the_issue_a_window_later_on() {
 #[test]
 fn padding_changes_nothing_wherever_it_stands() {
     for variant in variants() {
-        if !variant.numbers.collisions.has_zero_and_infinity() {
-            continue;
-        }
         let mut machine = unlimited(&variant);
         let scene = Step::on_ground(3, 3);
         let expected = machine.step(&scene).expect("the step completes");
@@ -397,13 +382,11 @@ fn formats_that_cannot_be_built_are_refused_with_what_is_expected() {
     let with = |profile: &'static Profile, numbers| {
         refusal(BoardConfig { numbers: Some(numbers), ..config(profile) })
     };
-    let thesis = StreamFormat::Thesis16;
-    for format in [thesis, StreamFormat::Thesis16Literal] {
-        let numbers = Some(Numbers { bodies: format, ..HALF.numbers });
-        let text = refusal(BoardConfig { numbers, inertia: Inertia::World, ..config(&HALF) });
-        assert!(text.contains(&format!("in {}, which has no zero", format.name())), "{text}");
+    for profile in [&NAIVE, &HALF] {
+        let text = refusal(BoardConfig { inertia: Inertia::World, ..config(profile) });
+        assert!(text.contains(&format!("inertia on {}, found world", profile.name)), "{text}");
     }
-    let text = with(&FLOAT, Numbers { bodies: thesis, ..Numbers::F32 });
+    let text = with(&FLOAT, Numbers { bodies: StreamFormat::Binary16, ..Numbers::F32 });
     assert!(text.contains("velocity records of 16 bits a number, expected 32"), "{text}");
     let text = with(&HALF, Numbers::F32);
     assert!(text.contains("collision records of 32 bits a number, expected 16"), "{text}");

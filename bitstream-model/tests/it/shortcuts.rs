@@ -33,6 +33,7 @@ fn config() -> impl Strategy<Value = BoardConfig> {
     )
         .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots, inertia)| {
             let usual = board(profile, fifo_beats);
+            let inertia = profile.world.map_or(Inertia::Isotropic, |_| inertia);
             BoardConfig { length_width, bandwidth, window_slots, inertia, ..usual }
         })
 }

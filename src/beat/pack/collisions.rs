@@ -3,18 +3,19 @@
 //! The method is the one of [`bodies`](super::bodies): threads take ranges, each range goes block
 //! by block, and the packer writes each beat once, upwards, and never reads it back.
 
+use pgs_interface::number::StreamFormat;
 use std::ops::Range;
 
 use pgs_interface::record::{Beat, collision};
 
 use super::encode::{Encoding, most_are_full};
 use super::pool::{ChannelChunks, PackPool, Piece, ranges, whole};
-use super::stripe_writer::{BLOCK, CHECKED, MANY, StripeWriter};
+use super::stripe_writer::{CHECKED, MANY, StripeWriter};
 use super::target::Target;
 use crate::beat::format::{Format, in_format};
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Ends, Lookup as _};
-use crate::record::sixteen::Sixteen;
 use crate::record::source::{CollisionSource, Contiguous, InNearbyOrder, Indexed};
 use crate::scene::{Collision, Collisions, Structures};
 use crate::simd::{Vectors, Work, in_wide_vectors};
@@ -216,10 +217,9 @@ impl<'p, L: CollisionSource<'p>> Work for Writing<'p, '_, '_, L> {
 
 impl<'p, L: CollisionSource<'p>> Writing<'p, '_, '_, L> {
     /// Whether a loop with checks branches around the masks where all contact points are used. In
-    /// loops of f32, and in loops without checks, the branch costs as much as the masks. The
-    /// conversion to the thesis' format takes far longer than either.
+    /// loops of f32, and in loops without checks, the branch costs as much as the masks.
     const fn jumps<F: Format>() -> bool {
-        matches!(F::SIXTEEN, Some(Sixteen::Binary16))
+        matches!(F::WORDS, StreamFormat::Binary16)
     }
 
     /// Encodes, checks and writes the collisions block by block, and prefetches later ones

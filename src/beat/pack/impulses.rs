@@ -12,11 +12,10 @@ use pgs_interface::record::{Beat, LANES, collision};
 
 use super::encode::Encoding;
 use super::pool::{PackPool, Stretch as _, ranges};
-use super::stripe_writer::BLOCK;
 use crate::beat::format::{Beats, Format, Join, Records as _, in_format};
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Ends, Lookup as _};
-use crate::record::sixteen::Sixteen;
 use crate::record::source::Contiguous;
 use crate::record::{Row, Rows};
 use crate::scene::{Collision, Collisions, Impulses};
@@ -159,7 +158,7 @@ impl Work for Writing<'_, '_> {
 
     #[inline(always)]
     fn run<V: Vectors>(self, vectors: V) -> WarmSums {
-        let format = Sixteen::of(self.issue.variant.numbers.collisions);
+        let format = self.issue.variant.numbers.collisions;
         in_format!(format, F => self.run_as::<V, F>(vectors))
     }
 }

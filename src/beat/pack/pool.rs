@@ -13,7 +13,7 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 use pgs_support::Crew;
 
-use super::stripe_writer::BLOCK;
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Layout;
 use crate::platform::{acquire_from_device, release_to_device};
 

@@ -5,6 +5,7 @@
 //! write-combining memory needs. The writer reads nothing back: it takes the sum for the check of
 //! the accelerator on the way.
 
+use pgs_interface::number::StreamFormat;
 use std::mem;
 
 use pgs_interface::record::Beat;
@@ -12,16 +13,9 @@ use pgs_interface::record::Beat;
 use super::pattern::Pattern;
 use super::unrolled;
 use crate::beat::format::{Beats, Format, Records, in_format};
-use crate::beat::stripe::{Deal, Layout};
-use crate::beat::unpack::results::total;
-use crate::record::sixteen::Sixteen;
+use crate::beat::stripe::{BLOCK, Deal, Layout, total};
 use crate::record::{Row, Rows};
 use crate::simd::{Lanes, Vectors};
-
-/// Records of a block. The number is divisible by the records of a group of every stripe, so that
-/// each block begins with a group. A block and the collisions that are prefetched meanwhile fit in
-/// the L1 cache.
-pub(crate) const BLOCK: usize = 30;
 
 /// Records of many blocks: at this number the start of a run costs next to nothing a record.
 pub(crate) const MANY: usize = 32 * BLOCK;
@@ -39,7 +33,7 @@ const _: () = assert!(BODIES.is_multiple_of(BLOCK), "so that each begins with a 
 pub(crate) struct StripeWriter<'a, 'b> {
     /// The beats that are not written yet.
     channels: &'a mut [&'b mut [Beat]],
-    format: Option<Sixteen>,
+    format: StreamFormat,
     /// The pattern of the stripe, if a profile has it, and its first channel.
     pattern: Option<(Pattern, usize)>,
     deal: Deal,
@@ -54,7 +48,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
     pub(crate) fn new(layout: &Layout, channels: &'a mut [&'b mut [Beat]]) -> Self {
         Self {
             channels,
-            format: Sixteen::of(layout.format),
+            format: layout.format,
             pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),
             padded: layout.stripe.padded,
@@ -72,9 +66,9 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         in_format!(self.format, F => self.write_as::<V, F, R, ROWS>(vectors, records));
     }
 
-    /// The 16-bit format of the words; `None` for f32.
+    /// The format of the words.
     #[inline(always)]
-    pub(crate) const fn format(&self) -> Option<Sixteen> {
+    pub(crate) const fn format(&self) -> StreamFormat {
         self.format
     }
 
@@ -85,7 +79,7 @@ impl<'a, 'b> StripeWriter<'a, 'b> {
         vectors: V,
         records: &mut R,
     ) {
-        debug_assert_eq!(F::SIXTEEN, self.format, "the words are those of the stream");
+        debug_assert_eq!(F::WORDS, self.format, "the words are those of the stream");
         let mut sum = self.sum;
         let done = match self.pattern {
             Some((pattern, first)) if self.deal.at_end_of_group() => {
@@ -154,7 +148,7 @@ mod tests {
 
     use super::*;
     use crate::beat::stripe::Place;
-    use crate::record::Record;
+    use crate::record::{Record, sixteen};
     use crate::simd::{Integer, Work, in_wide_vectors};
 
     const ROWS: usize = 3;
@@ -218,11 +212,11 @@ mod tests {
             let rows: Vec<[u32; LANES]> = records.iter().flatten().copied().collect();
             let mut beats = vec![Beat::default(); layout.beats(records.len())];
             for (at, row) in rows.iter().enumerate() {
-                match Sixteen::of(format) {
-                    None => beats[at] = Beat(*row),
-                    Some(sixteen) => {
+                match format {
+                    StreamFormat::F32 => beats[at] = Beat(*row),
+                    StreamFormat::Binary16 => {
                         let integer = at % ROWS == 0;
-                        let row = narrowed(sixteen, *row, integer).map(u32::from);
+                        let row = narrowed(*row, integer).map(u32::from);
                         let to = &mut beats[at / 2].0[at % 2 * 2..][..2];
                         to.copy_from_slice(&[row[0] | row[1] << 16, row[2] | row[3] << 16]);
                     }
@@ -240,20 +234,20 @@ mod tests {
         }
     }
 
-    fn narrowed(format: Sixteen, row: [u32; LANES], integer: bool) -> [u16; LANES] {
-        struct One(Sixteen, [u32; LANES], bool);
+    fn narrowed(row: [u32; LANES], integer: bool) -> [u16; LANES] {
+        struct One([u32; LANES], bool);
         impl Work for One {
             type Output = [u16; LANES];
 
             #[inline(always)]
             fn run<V: Vectors>(self, vectors: V) -> [u16; LANES] {
-                let Self(format, row, integer) = self;
+                let Self(row, integer) = self;
                 let numbers = Lanes::new(row);
                 let integer = integer.then(|| Integer::new::<{ LANES - 1 }>(numbers));
-                let [narrow, _] = format.narrow(vectors, [Row { numbers, integer }, Row::zero()]);
+                let [narrow, _] = sixteen::narrow(vectors, [Row { numbers, integer }, Row::zero()]);
                 narrow
             }
         }
-        in_wide_vectors(One(format, row, integer))
+        in_wide_vectors(One(row, integer))
     }
 }

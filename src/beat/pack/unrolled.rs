@@ -120,13 +120,12 @@ impl<V: Vectors, F: Join> Rows for Made<'_, V, F> {
 
 #[cfg(test)]
 mod tests {
-    use pgs_interface::profile::{Inertia, PROFILES, Variant};
+    use pgs_interface::profile::{PROFILES, Variant};
 
     use super::*;
     use crate::beat::format::in_format;
-    use crate::beat::pack::stripe_writer::BLOCK;
+    use crate::beat::stripe::BLOCK;
     use crate::beat::stripe::{Layout, Segment};
-    use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
 
     /// The places of the first `BEATS` beats of a pattern.
@@ -187,7 +186,7 @@ mod tests {
             let mut beats = vec![Beat::default(); 4 * BLOCK * ROWS];
             let mut rest: Vec<&mut [Beat]> = beats.chunks_mut(BLOCK * ROWS).collect();
             let sum = &mut Lanes::all(0);
-            in_format!(Sixteen::of(layout.format), F => {
+            in_format!(layout.format, F => {
                 write::<_, F, _, ROWS>(pattern, vectors, &mut Zeros, &mut rest, sum)
             })
         }
@@ -197,8 +196,8 @@ mod tests {
     #[test]
     fn all_records_of_the_profiles_are_written_by_units() {
         for profile in PROFILES {
-            for inertia in [Inertia::Isotropic, Inertia::World] {
-                let variant = Variant { inertia, ..profile.default_variant() };
+            for inertia in profile.inertias() {
+                let variant = Variant { inertia: *inertia, ..profile.default_variant() };
                 for segment in [Segment::Velocities, Segment::Collisions, Segment::Poses] {
                     let layout = segment.layout(&variant);
                     let written = match layout.rows {

@@ -6,8 +6,8 @@ use pgs_interface::record::Beat;
 use pgs_support::float_env::standard;
 
 use super::collisions::{CollisionPacker, Seen};
-use super::stripe_writer::BLOCK;
 use super::target::Target;
+use crate::beat::stripe::BLOCK;
 use crate::record::body_table::Ends;
 use crate::record::source::Contiguous;
 use crate::scene::Collision;

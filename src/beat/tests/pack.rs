@@ -7,15 +7,14 @@ use proptest::prelude::*;
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::PackPool;
-use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::pack::target::Target;
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::record::body_table::{Survey, Table};
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Structures, Velocity,
 };
-use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, Variant};
 use pgs_interface::record::Beat;
 
@@ -58,8 +57,6 @@ impl Collisions for Given<'_> {
 enum Words {
     F32,
     Binary16,
-    Thesis16,
-    Thesis16Literal,
 }
 
 /// A bitstream as the specification describes it.
@@ -104,37 +101,10 @@ const HALF_SPEC: Spec = Spec {
     bodies: Words::Binary16,
     world: false,
 };
-const THESIS_SPEC: Spec = Spec {
-    variant: Variant {
-        numbers: Numbers {
-            collisions: StreamFormat::Thesis16,
-            bodies: StreamFormat::Thesis16,
-            poses: StreamFormat::Thesis16,
-            ..HALF.numbers
-        },
-        ..HALF.default_variant()
-    },
-    collisions: Words::Thesis16,
-    bodies: Words::Thesis16,
-    ..HALF_SPEC
-};
-const LITERAL_SPEC: Spec = Spec {
-    variant: Variant {
-        numbers: Numbers {
-            collisions: StreamFormat::Thesis16Literal,
-            bodies: StreamFormat::Thesis16Literal,
-            poses: StreamFormat::Thesis16Literal,
-            ..HALF.numbers
-        },
-        ..HALF.default_variant()
-    },
-    collisions: Words::Thesis16Literal,
-    bodies: Words::Thesis16Literal,
-    ..HALF_SPEC
-};
 fn any_spec() -> impl Strategy<Value = Spec> {
-    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC, THESIS_SPEC, LITERAL_SPEC];
+    let specs = vec![NAIVE_SPEC, FLOAT_SPEC, HALF_SPEC];
     (prop::sample::select(specs), any::<bool>()).prop_map(|(spec, world)| {
+        let world = world && spec.variant.profile.world.is_some();
         let inertia = if world { Inertia::World } else { Inertia::Isotropic };
         Spec { variant: Variant { inertia, ..spec.variant }, world, ..spec }
     })
@@ -145,32 +115,7 @@ fn word(words: Words, value: f32) -> u32 {
     match words {
         Words::F32 => value.to_bits(),
         Words::Binary16 => half::f16::from_f32(value).to_bits().into(),
-        Words::Thesis16 => thesis(value),
-        Words::Thesis16Literal => literal(value),
     }
-}
-
-/// Sign, F and mantissa of the written definition, by arithmetic.
-fn thesis(value: f32) -> u32 {
-    let sign = if value.is_sign_negative() { 0x8000 } else { 0 };
-    let magnitude = f64::from(value).abs();
-    let Some(f) = (0..31_i32).rev().find(|f| magnitude >= 2.0_f64.powi(f - 15)) else {
-        return sign;
-    };
-    if magnitude >= 65_536.0 {
-        return sign | 31 << 10;
-    }
-    let mantissa = ((magnitude / 2.0_f64.powi(f - 15) - 1.0) * 1024.0).floor();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1023")]
-    let mantissa = mantissa as u32;
-    sign | (u32::try_from(f).expect("0 to 30") << 10) | mantissa
-}
-
-/// Sign, the exponent's top bit and four low bits, and the mantissa's ten top bits.
-fn literal(value: f32) -> u32 {
-    let bits = value.to_bits();
-    let [sign, top, low] = [bits >> 31, bits >> 30 & 1, bits >> 23 & 15];
-    sign << 15 | top << 14 | low << 10 | bits >> 13 & 1023
 }
 
 /// The rows of a segment in their order, and the number of beats.

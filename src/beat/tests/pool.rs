@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use crate::beat::pack::bodies::{pack_bodies, survey};
 use crate::beat::pack::collisions::{Entries, pack_collisions};
 use crate::beat::pack::pool::{ChannelChunks, PackPool, RANGE, ranges, whole};
-use crate::beat::pack::stripe_writer::BLOCK;
 use crate::beat::pack::target::Target;
+use crate::beat::stripe::BLOCK;
 use crate::beat::stripe::Segment;
 use crate::beat::unpack::results::{Reader, read_all};
 use crate::record::body_table::{End, Ends, Survey, Table};
@@ -210,7 +210,8 @@ fn any_count() -> impl Strategy<Value = usize> {
 
 fn any_variant() -> impl Strategy<Value = Variant> {
     (prop::sample::select(PROFILES.to_vec()), any::<bool>()).prop_map(|(profile, world)| {
-        let inertia = if world { Inertia::World } else { Inertia::Isotropic };
+        let inertia =
+            profile.world.filter(|_| world).map_or(Inertia::Isotropic, |_| Inertia::World);
         Variant { inertia, ..profile.default_variant() }
     })
 }

@@ -191,7 +191,7 @@ fn a_pile_is_found_good_at_once() {
     let schedule: Schedule = entries.chain((0..298).filter(|at| at % 90 == 89).map(Some)).collect();
     let formats = StreamFormat::ALL;
     for profile in PROFILES {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
+        for inertia in profile.inertias().iter().copied() {
             for format in formats {
                 for rows in [Precision::F32, Precision::Binary16] {
                     let mut variant = Variant { inertia, ..profile.default_variant() };

@@ -28,7 +28,8 @@ fn any_limits() -> impl Strategy<Value = Limits> {
                 let same = format.bits() == variant.numbers.collisions.bits();
                 variant.numbers = if same { numbers } else { Numbers { rows, ..variant.numbers } };
             }
-            variant.inertia = if world { Inertia::World } else { Inertia::Isotropic };
+            let world = variant.profile.world.filter(|_| world);
+            variant.inertia = world.map_or(Inertia::Isotropic, |_| Inertia::World);
             limits(variant, flush)
         })
 }

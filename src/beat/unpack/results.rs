@@ -4,16 +4,16 @@
 //! numbers are made on the way. Whole units come first ([`stripe_reader`]). The rest at a segment's
 //! end, and a stripe that no profile has, come beat by beat.
 
+use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, result};
 
 use super::stripe_reader::{self, Tally};
 use crate::beat::format::{Format, in_format};
 use crate::beat::pack::pattern::Pattern;
 use crate::beat::pack::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
-use crate::beat::stripe::{Deal, Layout};
+use crate::beat::stripe::{Deal, Layout, total};
 use crate::record::finite::Finite;
 use crate::record::result::Record;
-use crate::record::sixteen::Sixteen;
 use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
 
 /// Reads the results of all records from the result segments, one a channel, on several threads if
@@ -47,12 +47,11 @@ pub(crate) fn read_all(
 
 /// Reads results from the result segments, one a channel.
 ///
-/// A number that the accelerator could not hold is not finite; thesis16-literal writes some of them as
-/// other finite numbers.
+/// A number that the accelerator could not hold is not finite.
 pub(crate) struct Reader<'a> {
     /// The beats that are not read yet.
     channels: PieceRead<'a>,
-    format: Option<Sixteen>,
+    format: StreamFormat,
     /// The pattern of the stripe, if a profile has it, and its first channel.
     pattern: Option<(Pattern, usize)>,
     deal: Deal,
@@ -66,7 +65,7 @@ impl<'a> Reader<'a> {
     pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
         Self {
             channels: whole_read(channels),
-            format: Sixteen::of(layout.format),
+            format: layout.format,
             pattern: Pattern::of(layout.stripe.streams),
             deal: Deal::new(layout.stripe),
             sum: Lanes::all(0),
@@ -142,11 +141,6 @@ fn plus(sum: Lanes, beat: &Beat) -> Lanes {
     sum.plus((*beat).into())
 }
 
-/// The sum of the lanes' sums.
-pub(crate) fn total(sum: Lanes) -> u32 {
-    sum.words().into_iter().fold(0, u32::wrapping_add)
-}
-
 #[cfg(test)]
 mod tests {
     use pgs_interface::address_map::DMA_COUNT_MAX;
@@ -159,8 +153,8 @@ mod tests {
     use crate::record::finite::finite;
     use crate::record::result::decode;
     use crate::scene::{Pose, Velocity};
-    use pgs_interface::number::{Numbers, StreamFormat};
-    use pgs_interface::profile::{HALF, PROFILES, Variant};
+    use pgs_interface::number::StreamFormat;
+    use pgs_interface::profile::{HALF, PROFILES};
     use proptest::prelude::*;
 
     /// Everything that a reader reads, and the sum.
@@ -225,27 +219,24 @@ mod tests {
     /// All other numbers are the largest finite one.
     #[test]
     fn what_is_not_finite_in_sixteen_bits_is_found_wherever_it_is_and_nothing_else_is() {
-        for poses in [StreamFormat::Binary16, StreamFormat::Thesis16] {
-            let numbers = Numbers { poses, ..HALF.numbers };
-            let layout = Segment::Results.layout(&Variant { numbers, ..HALF.default_variant() });
-            let good = |at: usize, word: u16| {
-                let largest = 0x7BFF_7BFF;
-                // Three records fill six beats of ten: 0 0 1 1 2, 0.
-                let mut beats = [Beat([largest; 4]); 6];
-                let half = &mut bytemuck::cast_slice_mut::<_, u16>(&mut beats)[16 + at];
-                *half = word;
-                let [a, b, c, d, e, f] = beats;
-                let channels = [[a, b, f], [c, d, Beat::default()], [e; 3]];
-                let views = [&channels[0][..], &channels[1][..2], &channels[2][..1]];
-                let mut records = [Record::default(); 3];
-                Reader::new(&layout, &views).read(&mut records)
-            };
-            assert!(good(0, 0x7BFF) && good(0, 0xFBFF));
-            for word in [0x7C00, 0xFC00, 0x7C01, 0x7FFF, 0xFFFF] {
-                for at in 0..16 {
-                    let beside = [3, 11, 15].contains(&at);
-                    assert_eq!(good(at, word), beside, "{poses:?} {word:#x} {at}");
-                }
+        let layout = Segment::Results.layout(&HALF.default_variant());
+        let good = |at: usize, word: u16| {
+            let largest = 0x7BFF_7BFF;
+            // Three records fill six beats of ten: 0 0 1 1 2, 0.
+            let mut beats = [Beat([largest; 4]); 6];
+            let half = &mut bytemuck::cast_slice_mut::<_, u16>(&mut beats)[16 + at];
+            *half = word;
+            let [a, b, c, d, e, f] = beats;
+            let channels = [[a, b, f], [c, d, Beat::default()], [e; 3]];
+            let views = [&channels[0][..], &channels[1][..2], &channels[2][..1]];
+            let mut records = [Record::default(); 3];
+            Reader::new(&layout, &views).read(&mut records)
+        };
+        assert!(good(0, 0x7BFF) && good(0, 0xFBFF));
+        for word in [0x7C00, 0xFC00, 0x7C01, 0x7FFF, 0xFFFF] {
+            for at in 0..16 {
+                let beside = [3, 11, 15].contains(&at);
+                assert_eq!(good(at, word), beside, "{word:#x} {at}");
             }
         }
     }
@@ -258,15 +249,14 @@ mod tests {
     }
 
     /// The number of a word, as the bits of an f32.
-    fn number(format: Sixteen, word: u16) -> u32 {
+    fn number(word: u16) -> u32 {
         let (sign, f, m) = (u32::from(word >> 15) << 31, word >> 10 & 31, word & 1023);
         let (exponent, fraction) = (i32::from(f) - 15, f32::from(m) / 1024.0);
-        let thesis = format != Sixteen::Binary16;
         let magnitude = match (f, m) {
             // A NaN keeps its bits and is quiet.
-            (31, 1..) if !thesis => return sign | 0x7FC0_0000 | u32::from(m) << 13,
+            (31, 1..) => return sign | 0x7FC0_0000 | u32::from(m) << 13,
             (31, _) => f32::INFINITY,
-            (0, _) if !thesis => fraction * 2.0_f32.powi(-14),
+            (0, _) => fraction * 2.0_f32.powi(-14),
             _ => (1.0 + fraction) * 2.0_f32.powi(exponent),
         };
         sign | magnitude.to_bits()
@@ -278,7 +268,7 @@ mod tests {
     }
 
     /// Lays out records of 16-bit words as `half` does, and compares the numbers read from them.
-    fn read_sixteen_bit_results(words: &[[u16; 16]], thesis: bool) {
+    fn read_sixteen_bit_results(words: &[[u16; 16]]) {
         // half: 0 0 1 1 2, two beats a record.
         let mut segments = vec![Vec::new(); 3];
         for (index, halves) in words.iter().flat_map(|record| record.chunks(8)).enumerate() {
@@ -286,24 +276,13 @@ mod tests {
             segments[index % 5 / 2].push(Beat([0, 1, 2, 3].map(lane)));
         }
         let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
-        let poses = if thesis { StreamFormat::Thesis16 } else { StreamFormat::Binary16 };
-        let numbers_of = Numbers { poses, ..HALF.numbers };
-        let layout =
-            Segment::Results.layout(&Variant { numbers: numbers_of, ..HALF.default_variant() });
+        let layout = Segment::Results.layout(&HALF.default_variant());
         let (states, sum) = read(&layout, &views, words.len());
         assert_eq!(sum, sum_of(&segments));
         for (expected, (pose, velocity)) in words.iter().zip(states) {
-            let format = Sixteen::of(poses).expect("one of sixteen bits");
-            let expected: Vec<u32> =
-                of_words(expected).into_iter().map(|word| number(format, word)).collect();
+            let expected: Vec<u32> = of_words(expected).into_iter().map(number).collect();
             assert_eq!(numbers(pose, velocity), expected);
         }
-    }
-
-    /// An input that the property below failed on once, shrunk: the format has no zero.
-    #[test]
-    fn zero_words_of_the_thesis_format_come_back_as_their_number() {
-        read_sixteen_bit_results(&[[0; 16]], true);
     }
 
     proptest! {
@@ -332,9 +311,8 @@ mod tests {
         #[test]
         fn every_sixteen_bit_result_comes_back_as_its_number(
             words in prop::collection::vec(any::<[u16; 16]>(), 0..100),
-            thesis in any::<bool>(),
         ) {
-            read_sixteen_bit_results(&words, thesis);
+            read_sixteen_bit_results(&words);
         }
 
         /// Covers the stripes of the profiles and others, in every format, with reads of any
@@ -367,10 +345,12 @@ mod tests {
                     let row = record * result::ROWS + row;
                     let Place { channel, slot } = layout.place(row / layout.rows_per_beat());
                     let beat = segments[channel][slot];
-                    let Some(sixteen) = Sixteen::of(format) else { return beat };
+                    if format == StreamFormat::F32 {
+                        return beat;
+                    }
                     let halves: [u16; 8] = bytemuck::cast(beat);
                     let halves = halves.split_arrays::<LANES>().0[row % 2];
-                    Beat(halves.map(|word| number(sixteen, word)))
+                    Beat(halves.map(number))
                 }))
                 .collect();
 

@@ -108,9 +108,8 @@ mod tests {
 
     use super::*;
     use crate::beat::format::in_format;
-    use crate::beat::pack::stripe_writer::BLOCK;
+    use crate::beat::stripe::BLOCK;
     use crate::beat::stripe::{Layout, Segment};
-    use crate::record::sixteen::Sixteen;
     use crate::simd::{Work, in_wide_vectors};
 
     /// Counts the records of a layout that are read by units.
@@ -127,7 +126,7 @@ mod tests {
             let rest = &mut [&beats[..]; 4];
             let records = &mut [Record::default(); BLOCK];
             let tally = &mut Tally { sum: Lanes::all(0), finite: Finite::new() };
-            in_format!(Sixteen::of(layout.format), F => {
+            in_format!(layout.format, F => {
                 read::<V, F>(pattern, vectors, rest, records, tally)
             })
         }

@@ -14,8 +14,9 @@ use crate::platform::linux::dev_mem::{DevMem, DevMemWindows};
 use crate::platform::linux::fpga::LogicState;
 use crate::platform::linux::uio_listing::part_name;
 use crate::platform::linux::uio_listing::uio_listing;
+use crate::platform::memory::Caching;
 use crate::platform::memory::pool::{Pool, Region};
-use crate::platform::memory::u_dma_buf::{Caching, UDmaBuf};
+use crate::platform::memory::u_dma_buf::UDmaBuf;
 use crate::platform::{
     DmaMemorySource, ManagerChoice, Platform, PlatformError, RegisterMap, RegisterWindow,
     ReservedMemory, System, UioDevice,

@@ -10,12 +10,10 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::sysfs::{Attribute, numbered, read};
-use crate::platform::{PlatformError, System};
+use crate::platform::{PlatformError, System, ZYNQMP_MANAGER};
 
 /// The state of programmable logic that is ready.
 const OPERATING: &str = "operating";
-/// The kernel's name for the manager of the chip's own logic.
-pub const ZYNQMP_MANAGER: &str = "Xilinx ZynqMP FPGA Manager";
 
 /// Which FPGA manager knows whether the logic of a real board is programmed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -13,6 +13,17 @@ pub(crate) mod sync_mode;
 pub(crate) mod u_dma_buf;
 pub(crate) mod volatile;
 
+/// How the CPU sees the buffers of a u-dma-buf.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Caching {
+    /// Through its caches, with maintenance when a buffer changes hands: best for reading results.
+    #[default]
+    Cached,
+    /// Past its caches, stores combined: no maintenance, slow to read.
+    WriteCombining,
+}
+
 /// Memory for DMA, in pieces that belong to the CPU or to the device.
 ///
 /// A piece is addressed by the bus address of its first byte, as `allocate` returned it.

@@ -28,6 +28,7 @@ use std::sync::Arc;
 
 use pgs_interface::record::BEAT_BYTES;
 
+use super::Caching;
 use super::pool::Region;
 use super::sync_mode::set_mode;
 use super::volatile::MappedBeats;
@@ -36,17 +37,6 @@ use crate::platform::linux::mapped::Mapping;
 use crate::platform::linux::sysfs::{read_if_present, read_number};
 use crate::platform::linux::system::{open_device, require_bytes};
 use crate::platform::{Access, DmaMemory, PlatformError, SharedMemory, System};
-
-/// How the CPU sees the buffers of a u-dma-buf.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Caching {
-    /// Through its caches, with maintenance when a buffer changes hands: best for reading results.
-    #[default]
-    Cached,
-    /// Past its caches, stores combined: no maintenance, slow to read.
-    WriteCombining,
-}
 
 /// The number carries 32 bits of length, in multiples of 16.
 const BYTES_MAX: u64 = 0xFFFF_FFF0;

@@ -6,7 +6,7 @@ use std::fmt;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::window::{Decoded, RegisterMap};
+use super::map::{Decoded, RegisterMap};
 
 /// Number of accesses in the ring.
 const KEPT: usize = 64;

@@ -1,7 +1,6 @@
 //! Chooses how a board is built.
 
-use bitstream_model::interface::number::{Numbers, StreamFormat};
-use bitstream_model::interface::profile::{HALF, Inertia, PROFILES, Variant};
+use bitstream_model::interface::profile::{PROFILES, Variant};
 use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
 
 use crate::input::Input;
@@ -44,19 +43,11 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
 }
 
 fn variant(input: &mut Input<'_>) -> Variant {
-    let choice = input.index(2 * PROFILES.len() + 2);
-    match PROFILES.get(choice / 2) {
-        None => {
-            let literal = choice.is_multiple_of(2);
-            let thesis =
-                if literal { StreamFormat::Thesis16Literal } else { StreamFormat::Thesis16 };
-            let numbers =
-                Numbers { collisions: thesis, bodies: thesis, poses: thesis, ..Numbers::BINARY16 };
-            Variant { numbers, ..HALF.default_variant() }
-        }
-        Some(profile) if choice.is_multiple_of(2) => profile.default_variant(),
-        Some(profile) => Variant { inertia: Inertia::World, ..profile.default_variant() },
-    }
+    let built = PROFILES.iter().flat_map(|profile| {
+        let inertias = profile.inertias().iter();
+        inertias.map(|inertia| Variant { inertia: *inertia, ..profile.default_variant() })
+    });
+    input.pick(&built.collect::<Vec<Variant>>())
 }
 
 #[cfg(test)]

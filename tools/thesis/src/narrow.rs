@@ -26,16 +26,14 @@ impl NarrowFormat {
         match stream {
             StreamFormat::F32 => None,
             StreamFormat::Binary16 => Some(Self::Binary16),
-            StreamFormat::Thesis16 => Some(Self::Thesis16),
-            StreamFormat::Thesis16Literal => Some(Self::Thesis16Literal),
         }
     }
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Binary16 => StreamFormat::Binary16.name(),
-            Self::Thesis16 => StreamFormat::Thesis16.name(),
-            Self::Thesis16Literal => StreamFormat::Thesis16Literal.name(),
+            Self::Thesis16 => "thesis16",
+            Self::Thesis16Literal => "thesis16-literal",
             Self::Split { .. } => "split",
         }
     }
@@ -44,8 +42,7 @@ impl NarrowFormat {
     /// refuses to write; thesis16-literal has a word for every number, also for these.
     pub(crate) fn round_trip(self, value: f32) -> Option<f32> {
         let largest = match self {
-            Self::Binary16 => StreamFormat::Binary16.largest(),
-            Self::Thesis16 => StreamFormat::Thesis16.largest(),
+            Self::Binary16 | Self::Thesis16 => StreamFormat::Binary16.largest(),
             Self::Thesis16Literal => return Some(literal(value)),
             Self::Split { exponent, top } => return split(exponent, top, value),
         };
@@ -88,14 +85,11 @@ fn thesis16(value: f32) -> f32 {
     f32::from_bits(value.to_bits() & !0x1FFF)
 }
 
-/// Rounds a number as the streams of this format do; one that the driver refuses stays as it is,
-/// also in thesis16-literal.
-pub(crate) fn carried(stream: StreamFormat, value: f32) -> f32 {
-    let taken = |_: &NarrowFormat| value.abs() <= stream.largest();
-    NarrowFormat::of(stream)
-        .filter(taken)
-        .and_then(|format| format.round_trip(value))
-        .unwrap_or(value)
+/// Rounds a number as words of this format do, `None` for f32; one that a step refuses stays as it
+/// is, also in thesis16-literal.
+pub(crate) fn carried(format: Option<NarrowFormat>, value: f32) -> f32 {
+    let taken = |_: &NarrowFormat| value.abs() <= StreamFormat::Binary16.largest();
+    format.filter(taken).and_then(|format| format.round_trip(value)).unwrap_or(value)
 }
 
 /// Bits of a number behind its sign.

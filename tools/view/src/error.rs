@@ -6,7 +6,27 @@ use scene::Geometry;
 use thiserror::Error;
 use zynq_pgs::Pose;
 
-use crate::recording::TooLarge;
+/// A file's format cannot hold a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "expected at most {most} bytes in {what}, found {found}: record fewer frames, or fewer bodies"
+)]
+pub struct TooLarge {
+    /// The part of the file.
+    pub what: &'static str,
+    /// Its size in bytes.
+    pub found: u64,
+    /// The largest size that the format holds.
+    pub most: u64,
+}
+
+impl TooLarge {
+    /// Refuses a size beyond 32 bits.
+    pub(crate) fn check(what: &'static str, found: u64) -> Result<u32, Self> {
+        let most = u64::from(u32::MAX);
+        u32::try_from(found).map_err(|_| Self { what, found, most })
+    }
+}
 
 /// A recording or a picture that cannot become a file.
 #[derive(Debug, Error)]

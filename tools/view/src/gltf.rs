@@ -12,10 +12,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::base64;
-use crate::error::ViewError;
+use crate::error::{TooLarge, ViewError};
 use crate::kinds::{COLOURS, surfaces};
 use crate::mesh::Mesh;
-use crate::recording::{Recording, TooLarge};
+use crate::recording::Recording;
 
 /// Numbers of the specification.
 const FLOAT: u32 = 5126;

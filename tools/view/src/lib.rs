@@ -19,5 +19,5 @@ pub mod picture;
 mod quantise;
 mod recording;
 
-pub use error::ViewError;
-pub use recording::{Frame, Recording, TooLarge};
+pub use error::{TooLarge, ViewError};
+pub use recording::{Frame, Recording};

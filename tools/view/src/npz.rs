@@ -22,7 +22,8 @@ use std::io;
 use scene::Geometry;
 use step_folder::npy::{self, Element};
 
-use crate::recording::{Recording, TooLarge};
+use crate::error::TooLarge;
+use crate::recording::Recording;
 
 /// Version 2.0 of the format, which stored files need.
 const VERSION: u16 = 20;

@@ -1,33 +1,10 @@
 //! Keeps the poses of the moving bodies at some steps of a run.
 
 use scene::Geometry;
-use thiserror::Error;
 use zynq_pgs::{Body, Pose};
 
 use crate::error::ViewError;
 use crate::kinds::Kinds;
-
-/// A file's format cannot hold a recording.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "expected at most {most} bytes in {what}, found {found}: record fewer frames, or fewer bodies"
-)]
-pub struct TooLarge {
-    /// The part of the file.
-    pub what: &'static str,
-    /// Its size in bytes.
-    pub found: u64,
-    /// The largest size that the format holds.
-    pub most: u64,
-}
-
-impl TooLarge {
-    /// Refuses a size beyond 32 bits.
-    pub(crate) fn check(what: &'static str, found: u64) -> Result<u32, Self> {
-        let most = u64::from(u32::MAX);
-        u32::try_from(found).map_err(|_| Self { what, found, most })
-    }
-}
 
 /// Whether a file can show a pose: it is finite, and its orientation a direction.
 fn is_shown(pose: &Pose) -> bool {
@@ -147,6 +124,7 @@ pub(crate) fn fixture(frames: u32) -> Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::TooLarge;
 
     #[test]
     fn the_ground_is_left_out_and_equal_geometries_are_one() {

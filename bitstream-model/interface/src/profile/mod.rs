@@ -89,10 +89,8 @@ pub struct Profile {
     pub contact: Depth,
     /// Friction pipeline with isotropic inertia.
     pub friction: Depth,
-    /// Contact pipeline with world inertia.
-    pub world_contact: Depth,
-    /// Friction pipeline with world inertia.
-    pub world_friction: Depth,
+    /// Contact and friction pipeline with world inertia; `None`: there is no such build.
+    pub world: Option<[Depth; 2]>,
     /// Fill of the integration, clock cycles: from the last body in to the end of the step, the
     /// control around the pipeline included. It is the same for every step.
     pub integration_fill: u32,
@@ -119,6 +117,15 @@ impl Profile {
     #[must_use]
     pub fn by_id(id: u32) -> Option<&'static Self> {
         PROFILES.iter().copied().find(|profile| profile.id == id)
+    }
+
+    /// The forms of inertia with which it can be built.
+    #[must_use]
+    pub const fn inertias(&self) -> &'static [Inertia] {
+        match self.world {
+            Some(_) => &[Inertia::Isotropic, Inertia::World],
+            None => &[Inertia::Isotropic],
+        }
     }
 
     /// The profile with the default options of a build.
@@ -152,42 +159,28 @@ impl Variant {
         matches!(self.numbers.collisions, StreamFormat::F32)
     }
 
-    /// Whether bodies of inverse mass 0 can move: one at rest needs a zero.
-    #[must_use]
-    pub const fn has_kinematic(&self) -> bool {
-        self.numbers.bodies.has_zero_and_infinity()
-    }
-
-    /// Whether impulses can come in and go out: a collision without any needs a zero, and their row
-    /// a stream.
-    #[must_use]
-    pub const fn has_impulses(&self) -> bool {
-        self.profile.stripes.warm_collisions.is_some()
-            && self.numbers.collisions.has_zero_and_infinity()
-    }
-
-    /// Whether velocity records can bring the inverse mass of their body: the rows of a world inertia in
-    /// f32 have room for it.
+    /// Whether velocity records can bring the inverse mass of their body: the rows of a world inertia
+    /// have room for it.
     #[must_use]
     pub const fn has_streamed_masses(&self) -> bool {
-        matches!((self.inertia, self.numbers.bodies), (Inertia::World, StreamFormat::F32))
+        matches!(self.inertia, Inertia::World)
     }
 
     /// Contact pipeline.
     #[must_use]
     pub const fn contact(&self) -> Depth {
-        match self.inertia {
-            Inertia::Isotropic => self.profile.contact,
-            Inertia::World => self.profile.world_contact,
+        match (self.inertia, self.profile.world) {
+            (Inertia::World, Some([contact, _])) => contact,
+            _ => self.profile.contact,
         }
     }
 
     /// Friction pipeline.
     #[must_use]
     pub const fn friction(&self) -> Depth {
-        match self.inertia {
-            Inertia::Isotropic => self.profile.friction,
-            Inertia::World => self.profile.world_friction,
+        match (self.inertia, self.profile.world) {
+            (Inertia::World, Some([_, friction])) => friction,
+            _ => self.profile.friction,
         }
     }
 

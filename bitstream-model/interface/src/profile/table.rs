@@ -18,7 +18,7 @@ const FLOAT_FRICTION: Depth = Depth { fill: 314, window: 190 };
 const FLOAT_WORLD_CONTACT: Depth = Depth { fill: 388, window: 324 };
 const FLOAT_WORLD_FRICTION: Depth = Depth { fill: 328, window: 190 };
 
-/// Pipelines of every other profile, with either form of inertia: assumptions.
+/// Pipelines of every other profile: assumptions.
 const CONTACT: Depth = Depth { fill: 364, window: 316 };
 const FRICTION: Depth = Depth { fill: 306, window: 182 };
 
@@ -54,8 +54,7 @@ pub const NAIVE: Profile = Profile {
     collisions_per_issue: 1,
     contact: CONTACT,
     friction: FRICTION,
-    world_contact: CONTACT,
-    world_friction: FRICTION,
+    world: None,
     integration_fill: INTEGRATION_FILL,
     clock_khz: 275_000,
     memory: ONE_COPY,
@@ -80,8 +79,7 @@ pub const FLOAT: Profile = Profile {
     collisions_per_issue: 1,
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
-    world_contact: FLOAT_WORLD_CONTACT,
-    world_friction: FLOAT_WORLD_FRICTION,
+    world: Some([FLOAT_WORLD_CONTACT, FLOAT_WORLD_FRICTION]),
     integration_fill: INTEGRATION_FILL,
     clock_khz: 275_000,
     memory: ONE_COPY,
@@ -107,8 +105,7 @@ pub const HALF: Profile = Profile {
     collisions_per_issue: 2,
     contact: CONTACT,
     friction: FRICTION,
-    world_contact: CONTACT,
-    world_friction: FRICTION,
+    world: None,
     integration_fill: INTEGRATION_FILL,
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },

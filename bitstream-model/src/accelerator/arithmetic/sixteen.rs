@@ -73,30 +73,6 @@ pub(crate) fn to_binary16(value: f32) -> u32 {
     }
 }
 
-/// A thesis16 word as a number: with exponent bits F, (1 + mantissa / 1024) x 2^(F - 15).
-#[inline]
-pub(crate) fn from_thesis16(word: u32) -> f32 {
-    let magnitude = ((word & 0x7FFF) << EXTRA_BITS) + (REBIAS << 23);
-    f32::from_bits(((word & 0x8000) << 16) | magnitude)
-}
-
-/// The thesis16 word of a number: cut off, and saturated at both ends of the format. A magnitude
-/// of 2^17 or more and a NaN become the largest word of the number's sign.
-pub(crate) fn to_thesis16(value: f32) -> u32 {
-    let bits = value.to_bits();
-    let sign = (bits & SIGN) >> 16;
-    let magnitude = bits & !SIGN;
-    let word = magnitude.saturating_sub(REBIAS << 23) >> EXTRA_BITS;
-    sign | word.min(0x7FFF)
-}
-
-/// The word of a number in thesis16 taken literally: the sign, the top and the four low bits of the
-/// exponent, the ten top bits of the mantissa, whatever the three bits between are.
-pub(crate) fn to_thesis16_literal(value: f32) -> u32 {
-    let bits = value.to_bits();
-    ((bits >> 16) & 0xC000) | ((bits >> EXTRA_BITS) & 0x3FFF)
-}
-
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "the values are exact")]
 mod tests {
@@ -151,50 +127,5 @@ mod tests {
             assert_eq!(to_binary16(f32::from_bits(tie.to_bits() - 1)), word.into());
             assert_eq!(to_binary16(f32::from_bits(tie.to_bits() + 1)), u32::from(word) + 1);
         }
-    }
-
-    #[test]
-    fn thesis16_means_what_its_formula_says_for_every_word() {
-        for word in 0..=u16::MAX {
-            let exponent = f64::from((word >> 10) & 31) - 15.0;
-            let magnitude = (1.0 + f64::from(word & 0x3FF) / 1024.0) * exponent.exp2();
-            let expected = if word & 0x8000 == 0 { magnitude } else { -magnitude };
-            let found = from_thesis16(word.into());
-            assert_eq!(f64::from(found), expected, "{word:04x}");
-            assert_eq!(to_thesis16(found), u32::from(word), "{word:04x}");
-        }
-    }
-
-    #[test]
-    fn thesis16_cuts_off_and_stops_at_both_ends() {
-        assert_eq!(to_thesis16(0.0), 0);
-        assert_eq!(to_thesis16(-0.0), 0x8000);
-        assert_eq!(from_thesis16(0), 3.051_757_8e-5);
-        assert_eq!(to_thesis16(-1e-30), 0x8000);
-        assert_eq!(to_thesis16(1.0), 15 << 10);
-        assert_eq!(to_thesis16(f32::from_bits(1.0_f32.to_bits() + 0x1FFF)), 15 << 10);
-        assert_eq!(to_thesis16(65_535.9), 0x7BFF, "cut off, not rounded up");
-        for value in [65_536.0, 131_072.0, 1e30, f32::INFINITY, f32::NAN] {
-            assert_eq!(to_thesis16(value) >> 10, 31, "{value}");
-            assert_eq!(to_thesis16(-value) >> 10, 63, "{value}");
-        }
-    }
-
-    /// Compares with the written definition, in numbers: exponents that differ by 16 share a word.
-    #[test]
-    fn taken_literally_an_exponent_is_known_up_to_multiples_of_16() {
-        for word in 0..=u16::MAX {
-            let value = from_thesis16(word.into());
-            assert_eq!(to_thesis16_literal(value), u32::from(word), "{word:04x}");
-            let last = f32::from_bits(value.to_bits() + 0x1FFF);
-            assert_eq!(to_thesis16_literal(last), u32::from(word), "{word:04x}");
-            let [small, large] = [-16, 16].map(|by| f64::from(value) * f64::from(by).exp2());
-            #[expect(clippy::cast_possible_truncation, reason = "eleven bits, exact")]
-            let found = if value.abs() < 2.0 { small as f32 } else { large as f32 };
-            assert_eq!(to_thesis16_literal(found), u32::from(word), "{found:e}");
-        }
-        assert_eq!((to_thesis16_literal(0.0), to_thesis16_literal(-0.0)), (0, 0x8000));
-        assert_eq!(to_thesis16_literal(f32::INFINITY), 0x7C00);
-        assert_eq!(to_thesis16_literal(f32::NAN) >> 10, 31);
     }
 }

@@ -16,7 +16,6 @@ pub(crate) fn number(format: StreamFormat, word: u32) -> f32 {
     match format {
         StreamFormat::F32 => f32::from_bits(word),
         StreamFormat::Binary16 => sixteen::from_binary16(word),
-        StreamFormat::Thesis16 | StreamFormat::Thesis16Literal => sixteen::from_thesis16(word),
     }
 }
 
@@ -26,8 +25,6 @@ fn word(format: StreamFormat, number: f32) -> u32 {
     match format {
         StreamFormat::F32 => number.to_bits(),
         StreamFormat::Binary16 => sixteen::to_binary16(number),
-        StreamFormat::Thesis16 => sixteen::to_thesis16(number),
-        StreamFormat::Thesis16Literal => sixteen::to_thesis16_literal(number),
     }
 }
 

@@ -152,10 +152,9 @@ impl LockStep {
 
     /// The beats that a step with the model's arguments sends.
     fn sent_by_step(&mut self) -> Result<Sent, ExternalError> {
-        let has_impulses = self.config.variant().has_impulses();
         let mut read = |register: Register| self.model.read(register.offset);
         let set = read(FLAGS)?;
-        let kinds = match has_impulses && flags::IMPULSES_OUT.is_set(set) {
+        let kinds = match flags::IMPULSES_OUT.is_set(set) {
             true => {
                 let kinds = [read(CONTACT_ITERATIONS)?, read(FRICTION_ITERATIONS)?];
                 kinds.iter().filter(|iterations| **iterations > 0).count()

@@ -1,7 +1,7 @@
 //! The options that describe an emulated board. The library knows their values and their texts.
 
 use bitstream_model::interface::fence::Fence;
-use bitstream_model::interface::number::{Numbers, Precision, StreamFormat};
+use bitstream_model::interface::number::{Numbers, Precision};
 use bitstream_model::interface::profile::{Inertia, Profile};
 use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
 use clap::Args;
@@ -15,11 +15,6 @@ pub struct BuildArgs {
     /// Design of the accelerator [default: float]
     #[arg(long, value_name = "PROFILE", value_parser = profile())]
     profile: Option<&'static Profile>,
-    /// Numbers on streams of 16 bits: binary16 is IEEE 754, rounded to nearest even; thesis16 is
-    /// the thesis' own, rounded by truncation, and has no zero; thesis16-literal cuts bits out of
-    /// the exponent even where a small number becomes a large one [default: binary16]
-    #[arg(long, value_parser = choice("format", |build| build.format))]
-    format: Option<StreamFormat>,
     /// Precision of the pipeline's operators; storage keeps the width of the profile [default: the
     /// profile's]
     #[arg(long, value_parser = choice("arithmetic", |build| build.arithmetic))]
@@ -74,7 +69,6 @@ impl BuildArgs {
     pub fn build(&self) -> Build {
         Build {
             profile: self.profile,
-            format: self.format,
             arithmetic: self.arithmetic,
             inertia: self.inertia,
             hazards: self.hazards,
@@ -164,14 +158,14 @@ mod tests {
 
     #[test]
     fn each_option_of_the_command_line_is_that_of_a_text() {
-        let text = "half,binary16,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+        let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
                     length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
         let expected: Build = text.parse().expect("a build");
         let options = Build::keys()
             .map(|key| format!("--{key}={}", expected.value(key).expect("given in the text")));
         let parsed = Options::try_parse_from([String::new()].into_iter().chain(options));
         assert_eq!(parsed.expect("options").build.build(), expected);
-        Options::try_parse_from(["", "--format", "f32"]).expect_err("no choice");
+        Options::try_parse_from(["", "--arithmetic", "f64"]).expect_err("no choice");
         let error = Options::try_parse_from(["", "--window", "0"]).expect_err("no window");
         assert!(error.to_string().contains(": expected a whole number from 1 to "), "{error}");
     }
@@ -179,12 +173,9 @@ mod tests {
     #[test]
     fn every_option_is_named_when_it_is_given() {
         assert_eq!(board_option(&Build::default()), None);
-        for (key, value) in [
-            ("format", "thesis16"),
-            ("hazards", "unchecked"),
-            ("lanes", "off"),
-            ("profile", "half"),
-        ] {
+        for (key, value) in
+            [("arithmetic", "f32"), ("hazards", "unchecked"), ("lanes", "off"), ("profile", "half")]
+        {
             let mut build = Build::default();
             build.set(key, value).expect(key);
             assert_eq!(board_option(&build), Some(format!("--{key}")));
@@ -213,11 +204,7 @@ mod tests {
              arithmetic: rows binary16, \
              updates f32; on chip: velocities binary16, impulses binary16)"
         );
-        assert_eq!(
-            of("half", |numbers| numbers.bodies = StreamFormat::Thesis16).find('('),
-            Some(14)
-        );
-        for text in ["float", "naive,flush,world", "half,thesis16,f32", "half,f32,world"] {
+        for text in ["float", "naive,flush", "float,world", "half,f32"] {
             assert_eq!(described(&text.parse::<Build>().expect(text).config()), text);
         }
         let of_this_machine: Build = "float,threads=1,lanes=off".parse().expect("a build");

@@ -230,10 +230,10 @@ pub(super) fn parameters(
     let all = invalid == InvalidValues::Sometimes && input.one_in(64);
     if switches & 96 == 96 {
         let wanted = input.byte();
-        parameters.kinematic = (all || variant.has_kinematic()) && wanted & 1 == 1;
+        parameters.kinematic = wanted & 1 == 1;
         parameters.pair_friction = (all || variant.has_pair_friction()) && wanted & 2 == 2;
-        parameters.warm_start = (all || variant.has_impulses()) && wanted & 4 == 4;
-        parameters.impulses_out = (all || variant.has_impulses()) && wanted & 8 == 8;
+        parameters.warm_start = wanted & 4 == 4;
+        parameters.impulses_out = wanted & 8 == 8;
     }
     if switches & 12 == 12 {
         let orders = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];

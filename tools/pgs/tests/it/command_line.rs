@@ -194,16 +194,16 @@ fn run_reports_every_step_as_json() {
 #[test]
 fn reports_say_how_the_board_is_built() {
     let options = ["--profile", "half", "--arithmetic", "f32"];
-    let more = ["--inertia", "world", "--hazards", "unchecked", "--window", "64"];
+    let more = ["--hazards", "unchecked", "--window", "64"];
     let scene = ["--grid", "2x2x2", "--steps", "2", "--drop", "0"];
     let ran = run([&["--json"], &options[..], &more[..], &scene[..]].concat());
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let board = &ran.json()["board"];
     assert_eq!(board["profile"], "half");
-    assert_eq!(board["design"], "half,f32,world");
-    assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64,world");
-    let text = run([&options[..], &["--format", "thesis16"], &scene[..]].concat()).stdout;
-    assert!(text.contains("bitstream  half,thesis16,f32, 250 MHz"), "{text}");
+    assert_eq!(board["design"], "half,f32");
+    assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64");
+    let text = run([&options[..], &scene[..]].concat()).stdout;
+    assert!(text.contains("bitstream  half,f32, 250 MHz"), "{text}");
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn assert_no_difference(value: &Value, name: &str) {
 #[test]
 fn a_board_does_not_differ_from_itself() {
     let scene = ["--grid", "4x3x4", "--steps", "70", "--every", "23"];
-    for build in ["float", "half,thesis16,f32", "naive,unchecked,window=64"] {
+    for build in ["float", "half,f32", "naive,unchecked,window=64"] {
         let document = compare(&[&[build, build], &scene[..]].concat());
         assert_eq!(document["complete"], true);
         assert_eq!(document["a"]["digest"], document["b"]["digest"]);
@@ -121,12 +121,12 @@ fn without_hazards_it_does_not_matter_who_waits() {
 #[test]
 fn a_pile_of_shapes_takes_world_inertia_and_loses_its_energy() {
     let scene = ["--scene", "shapes", "--grid", "3x3x3", "--drop", "0.5", "--steps", "150"];
-    let ran = run([&["thesis", "compare", "float", "naive,world"], &scene[..]].concat());
+    let ran = run([&["thesis", "compare", "float", "float,world"], &scene[..]].concat());
     assert_eq!(ran.code, Some(2), "{}", ran.stdout);
     assert!(ran.stderr.contains("board A (float)"), "{}", ran.stderr);
     assert!(ran.stderr.contains("--inertia world"), "{}", ran.stderr);
 
-    let document = compare(&[&["float,world", "naive,world"], &scene[..]].concat());
+    let document = compare(&[&["float,world", "float,world,threads=1"], &scene[..]].concat());
     assert_eq!(document["config"]["scene"], "shapes");
     let rows = document["rows"].as_array().expect("rows");
     let last = &rows[rows.len() - 1];
@@ -257,8 +257,8 @@ fn wrong_usage_says_what_is_known() {
     for (arguments, said) in [
         (&["thesis", "compare", "float"][..], "<B>"),
         (&["thesis", "compare", "float", "quarter"], "naive, float, half"),
-        (&["thesis", "compare", "float", "half,quick"], "thesis16"),
-        (&["thesis", "compare", "float", "float,thesis16", "--grid", "2x2x2"], "(half)"),
+        (&["thesis", "compare", "float", "half,quick"], "unchecked"),
+        (&["thesis", "compare", "float", "half,world", "--grid", "2x2x2"], "take float"),
         (
             &["thesis", "compare", "float", "half", "--board", "uio"],
             "unexpected argument '--board'",

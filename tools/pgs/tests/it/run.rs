@@ -29,8 +29,7 @@ fn fact(text: &str, label: &str) -> String {
 fn no_line_is_wider_than_a_terminal() {
     for options in [
         "--grid 5x5x5 --steps 40",
-        "--grid 4x4x4 --steps 30 --profile half --format thesis16 --arithmetic f32 --hazards \
-         unchecked",
+        "--grid 4x4x4 --steps 30 --profile half --arithmetic f32 --hazards unchecked",
         "--grid 4x4x4 --steps 30 --profile half --verify",
         "--grid 3x3x3 --steps 3 --scene shapes --inertia world --length-width 14 --retries 2",
         "--grid 3x3x3 --steps 9 --fault irq-drop,times=3",

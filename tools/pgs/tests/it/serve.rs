@@ -124,7 +124,7 @@ fn where_no_board_is_served_there_is_none() {
     for (rest, reason) in [
         (&["--memory", "uio"][..], "similar argument exists: '--memory-mib'"),
         (&["--board", "uio"], "unexpected argument '--board'"),
-        (&["--format", "thesis16"], "take a profile with streams of 16 bits"),
+        (&["--profile", "half", "--inertia", "world"], "take float"),
     ] {
         let ran = serve(rest);
         assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{rest:?}");

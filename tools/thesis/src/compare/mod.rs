@@ -33,17 +33,17 @@ Examples:
   pgs thesis compare float,hazard-free float,unchecked,as-given --input tests/golden/pile5_step60
   pgs thesis compare float,gpu float,as-given --input tests/golden/pile5_step60
   pgs thesis compare float half --input tests/golden/pile5_step60
-  pgs thesis compare half,thesis16 half,binary16 --steps 300 --every 10 --json
-  pgs thesis compare float,world naive,world --scene shapes --grid 8x8x8
+  pgs thesis compare half,f32 half --steps 300 --every 10 --json
+  pgs thesis compare float,world float,world,unchecked --scene shapes --grid 8x8x8
 
 Examples with the Verilog in simulation (docs/bitstream.md):
   pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator \
   rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
-change is a word: binary16, thesis16, thesis16-literal (numbers on 16-bit streams), f32
-(arithmetic), interlocked, unchecked, keep, flush, isotropic, world; or window=SLOTS,
-bandwidth=GBPS, arithmetic=f32|binary16, length-width=BITS, address-width=BITS, threads=N and
+change is a word: f32, binary16 (arithmetic), interlocked, unchecked, keep, flush, isotropic, \
+world; or window=SLOTS,
+bandwidth=GBPS, length-width=BITS, address-width=BITS, threads=N and
 lanes=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
 hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
 random=SEED (another one in each step). Without an order, a board that waits on hazards takes the

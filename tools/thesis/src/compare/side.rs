@@ -9,7 +9,7 @@ use zynq_pgs::{Body, Collision, Error, Fault, InputError, StepParameters, StepRe
 
 use super::spec::SideSpec;
 use crate::deviation::{moving, unmoved_share};
-use crate::narrow::carried;
+use crate::narrow::{NarrowFormat, carried};
 use crate::permutation::{self, Permutation};
 use crate::study::run::{Run, World};
 use pgs_command::board::{self, OpenBoard};
@@ -160,7 +160,7 @@ impl<'a> Side<'a> {
 
     /// Rounds a number as the streams of the bodies do.
     fn carried(&self, value: f32) -> f32 {
-        carried(self.spec.build.config().variant().numbers.poses, value)
+        carried(NarrowFormat::of(self.spec.build.config().variant().numbers.poses), value)
     }
 
     pub(super) fn digest(&self) -> String {

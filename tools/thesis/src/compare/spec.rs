@@ -69,7 +69,7 @@ mod tests {
     fn a_side_is_written_as_it_is_read() {
         for text in [
             "float",
-            "half,thesis16,f32,unchecked",
+            "half,f32,unchecked",
             "float,unchecked,hazard-free",
             "naive,body-by-body-oldest",
             "float,auto",

@@ -104,6 +104,29 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// Takes a step by a function of bodies and collisions instead of a board; false if Ctrl-C
+    /// ended it.
+    pub(super) fn step_by(
+        &mut self,
+        session: &Session,
+        step: impl FnOnce(&mut [Body], &[Collision]) -> Result<(), String>,
+    ) -> Result<bool, Failure> {
+        if session.is_interrupted() {
+            return Ok(false);
+        }
+        let stepped = match &mut self.world {
+            World::Scene(scene) => {
+                scene.detect();
+                let (bodies, collisions) = scene.parts_mut();
+                step(bodies, collisions)
+            }
+            World::Folder { folder, bodies } => step(bodies, &folder.collisions),
+        };
+        stepped.map_err(Failure::input)?;
+        session.advance();
+        Ok(true)
+    }
+
     pub(super) fn bodies(&self) -> &[Body] {
         self.world.bodies()
     }

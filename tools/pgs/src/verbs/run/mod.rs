@@ -48,7 +48,7 @@ Examples:
   pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
   pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
   pgs run --order hazard-free --verify
-  pgs run --profile half --format thesis16       the thesis' design in sixteen bits
+  pgs run --profile half                          the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
@@ -157,7 +157,7 @@ impl RunArgs {
     /// taken as it is.
     fn parameters(&self, can: &Capabilities) -> StepParameters {
         let shapes = !self.scene.is_cubes();
-        let warm = self.warm_start.unwrap_or(shapes && can.variant.has_impulses());
+        let warm = self.warm_start.unwrap_or(shapes);
         let has_frictions = can.variant.has_pair_friction();
         let frictions = self.pair_friction.unwrap_or(shapes && has_frictions);
         let parameters = StepParameters::default()

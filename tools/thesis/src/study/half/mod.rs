@@ -3,12 +3,15 @@
 mod figures;
 mod show;
 mod splits;
+mod words;
+
+use std::fmt;
+use std::str::FromStr;
 
 use clap::Args;
-use pgs_interface::number::StreamFormat;
 use serde::Serialize;
 use serde_json::Value;
-use zynq_pgs::emulation::Build;
+use zynq_pgs::emulation::{Build, BuildError};
 
 use self::splits::Split;
 use super::recorded::{HALF_AGAINST_FLOAT, RecordedDeviation};
@@ -17,9 +20,10 @@ use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving, unmoved_share};
 use crate::experiment::{Boards, Measured};
 use crate::histogram::Histogram;
-use crate::narrow::carried;
+use crate::narrow::{NarrowFormat, carried};
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
+use pgs_command::common::CommonArgs;
 use pgs_command::failure::Failure;
 
 const EXAMPLES: &str = "\
@@ -30,10 +34,9 @@ Examples:
 
 The boards start from one state. float is the original; every other build takes the same steps by
 itself, with the collisions as given, and is compared with float as eq. 4.1 of the thesis does.
-Builds are written as for `pgs thesis compare`: half has binary16 throughout; thesis16 is the \
-thesis' own
-sixteen bits, and thesis16-literal its encoder taken literally. Unmoved is the share of position \
-components
+Builds are written as for `pgs thesis compare`: half has binary16 throughout. half,thesis16 has the
+thesis' own sixteen bits in its words, and half,thesis16-literal its encoder taken literally: no
+board has these, the reference solver computes them. Unmoved is the share of position components
 whose bits, as sent to the board, a step did not change. Energies are kinetic.
 
 The splits are of the sixteen bits of a number into exponent and mantissa (thesis §4.6.4), on the
@@ -58,7 +61,39 @@ pub(crate) struct Options {
     pub(crate) start: StartArgs,
     /// A build to step beside float; can be given several times
     #[arg(long = "build", value_name = "BUILD", default_values = DEFAULTS)]
-    pub(crate) builds: Vec<Build>,
+    pub(crate) builds: Vec<SixteenBits>,
+}
+
+/// Numbers to step beside float: those of a board, or half's with the words of the thesis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum SixteenBits {
+    /// A board of this build.
+    Board(Build),
+    /// The reference solver in binary16, behind words of this format.
+    Words(NarrowFormat),
+}
+
+impl FromStr for SixteenBits {
+    type Err = BuildError;
+
+    fn from_str(text: &str) -> Result<Self, BuildError> {
+        let words = NarrowFormat::ALL.into_iter().find(|format| text == of_words(*format));
+        words.map_or_else(|| text.parse().map(Self::Board), |format| Ok(Self::Words(format)))
+    }
+}
+
+impl fmt::Display for SixteenBits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Board(build) => build.fmt(f),
+            Self::Words(format) => f.write_str(&of_words(*format)),
+        }
+    }
+}
+
+/// The name of half with words of this format.
+fn of_words(format: NarrowFormat) -> String {
+    format!("half,{}", format.name())
 }
 
 /// The builds beside float, unless others are given.
@@ -117,17 +152,32 @@ pub(crate) struct Failed {
     pub(crate) error: String,
 }
 
-/// A board and its run.
+/// A board and its run; without a board the reference solver takes the steps.
 struct Side<'a> {
-    opened: OpenBoard,
+    opened: Option<OpenBoard>,
     run: Run<'a>,
-    poses: StreamFormat,
+    /// The format of poses, if it has sixteen bits.
+    poses: Option<NarrowFormat>,
 }
 
 impl<'a> Side<'a> {
     fn new(opened: OpenBoard, start: &'a Start<'_>) -> Result<Self, Failure> {
-        let poses = opened.accelerator.capabilities().variant.numbers.poses;
-        Ok(Self { opened, run: start.run(None)?, poses })
+        let poses = NarrowFormat::of(opened.accelerator.capabilities().variant.numbers.poses);
+        Ok(Self { opened: Some(opened), run: start.run(None)?, poses })
+    }
+
+    fn of(
+        numbers: &SixteenBits,
+        common: &CommonArgs,
+        start: &'a Start<'_>,
+        session: &Session,
+    ) -> Result<Self, Failure> {
+        match numbers {
+            SixteenBits::Board(build) => Self::new(start.open(build, common, session)?, start),
+            SixteenBits::Words(format) => {
+                Ok(Self { opened: None, run: start.run(None)?, poses: Some(*format) })
+            }
+        }
     }
 
     /// Takes a step; the share of position components that it left as they were, none at Ctrl-C.
@@ -138,7 +188,13 @@ impl<'a> Side<'a> {
         session: &Session,
     ) -> Result<Option<f64>, Failure> {
         let before = self.run.bodies().to_vec();
-        let taken = self.run.step(&mut self.opened, &start.parameters, session, start)?;
+        let taken = match (&mut self.opened, self.poses) {
+            (Some(opened), _) => self.run.step(opened, &start.parameters, session, start)?,
+            (None, Some(format)) => self.run.step_by(session, |bodies, collisions| {
+                words::step(format, bodies, start.shapes(), collisions, &start.parameters)
+            })?,
+            (None, None) => false,
+        };
         Ok(taken.then(|| {
             unmoved_share(&before, self.run.bodies(), moving, |value| carried(self.poses, value))
         }))
@@ -160,8 +216,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
     let (mut sides, mut builds) = (Vec::new(), Vec::new());
     for build in &options.builds {
         let about = |failure: Failure| failure.about(format!("board {build}"));
-        let opened = start.open(build, &common, session).map_err(about)?;
-        sides.push(Some(Side::new(opened, start)?));
+        sides.push(Some(Side::of(build, &common, start, session).map_err(about)?));
         let build = build.to_string();
         builds.push(OfBuild { build, curve: Vec::new(), position_histogram: None, failed: None });
     }
