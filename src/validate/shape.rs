@@ -174,9 +174,9 @@ mod tests {
                 "{error}"
             );
             assert!(
-                error.to_string().ends_with(
-                    "(profiles that could, built with world inertia: naive, float, half)"
-                ),
+                error
+                    .to_string()
+                    .ends_with("(profiles that could, built with world inertia: float)"),
                 "{error}"
             );
             let world = on(FLOAT.variant.profile, Inertia::World);

@@ -5,7 +5,7 @@
 use crate::common::direct::direct_step;
 use crate::common::random_scene::{scene, shapes};
 use crate::common::{bits, open_with, ordered, row};
-use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE};
+use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, NAIVE, Profile};
 use bitstream_model::{BoardConfig, Direction, Fault, FaultKind};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
@@ -16,7 +16,8 @@ fn boards(shapes: &[Shape]) -> Vec<BoardConfig> {
     let mut boards = Vec::new();
     let isotropic = shapes.iter().all(Shape::is_isotropic);
     let inertia = if isotropic { Inertia::Isotropic } else { Inertia::World };
-    for profile in [&FLOAT, &NAIVE] {
+    let built = |profile: &&Profile| profile.inertias().contains(&inertia);
+    for profile in [&FLOAT, &NAIVE].into_iter().filter(built) {
         for (shortcuts, lanes, threads) in
             [(false, false, 1), (true, false, 1), (true, true, 1), (true, true, 2)]
         {

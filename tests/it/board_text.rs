@@ -17,7 +17,7 @@ fn open(build: &str) -> Result<Accelerator, Error> {
 
 #[test]
 fn a_text_opens_the_board_that_it_describes() {
-    let text = "half,f32,world,unchecked,flush,length-width=14,address-width=32,threads=1";
+    let text = "float,world,unchecked,flush,length-width=14,address-width=32,threads=1";
     let board: BoardChoice = format!("emulated:{text}").parse().expect("a board");
     let by_choice = Accelerator::open(OpenOptions { board, ..OpenOptions::default() });
     for accelerator in [open(text), by_choice] {
@@ -66,9 +66,9 @@ fn what_cannot_be_opened_says_why() {
     let cause = error.source().expect("a cause").to_string();
     assert!(cause.starts_with("\"quick\" is no option of a build: give one of "), "{cause}");
 
-    let error = open("float,binary16").expect_err("a contradiction");
+    let error = open("half,world").expect_err("a contradiction");
     let Error::Open(OpenError::Emulation(cause)) = error else { panic!("{error:?}") };
-    assert!(matches!(cause, ConfigError::StreamFormat { .. }), "{cause}");
+    assert!(matches!(cause, ConfigError::NoWorldInertia { .. }), "{cause}");
 }
 
 #[test]

@@ -25,7 +25,7 @@ pub const INTERRUPTED: u8 = 130;
 /// The outcome of a command that ran.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// It did what it was asked for.
+    /// It did as asked.
     Done,
     /// A comparison found differences, or a check failed.
     Differs,
