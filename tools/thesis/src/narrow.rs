@@ -85,8 +85,8 @@ fn thesis16(value: f32) -> f32 {
     f32::from_bits(value.to_bits() & !0x1FFF)
 }
 
-/// Rounds a number as words of this format do, `None` for f32; one that a step refuses stays as it is,
-/// also in thesis16-literal.
+/// Rounds a number as words of this format do, `None` for f32; one that a step refuses stays as it
+/// is, also in thesis16-literal.
 pub(crate) fn carried(format: Option<NarrowFormat>, value: f32) -> f32 {
     let taken = |_: &NarrowFormat| value.abs() <= StreamFormat::Binary16.largest();
     format.filter(taken).and_then(|format| format.round_trip(value)).unwrap_or(value)

@@ -104,8 +104,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Takes a step by a function of bodies and collisions instead of a board; false if Ctrl-C ended
-    /// it.
+    /// Takes a step by a function of bodies and collisions instead of a board; false if Ctrl-C
+    /// ended it.
     pub(super) fn step_by(
         &mut self,
         session: &Session,

@@ -1,5 +1,6 @@
-//! Steps bodies in the sixteen-bit words of the thesis (§4.6.4): the numbers of a step are rounded to
-//! them on their way to and from the reference solver, which computes in binary16 as `half` does.
+//! Steps bodies in the sixteen-bit words of the thesis (§4.6.4): the numbers of a step are rounded
+//! to them on their way to and from the reference solver, which computes in binary16 as `half`
+//! does.
 
 use bitstream_model::reference::{self, Parameters};
 use pgs_interface::number::{Precision, StreamFormat};
@@ -7,7 +8,8 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
 use crate::narrow::NarrowFormat;
 
-/// Takes a step. A number that the words do not hold ends it in a sentence; nothing has changed then.
+/// Takes a step. A number that the words do not hold ends it in a sentence; nothing has changed
+/// then.
 pub(super) fn step(
     format: NarrowFormat,
     bodies: &mut [Body],
