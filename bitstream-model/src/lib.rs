@@ -4,18 +4,19 @@
 //! follows the contract of [`interface`], as a bitstream does.
 
 mod accelerator;
+mod arbiter;
 mod axi_dma;
 mod board;
 mod cast;
 mod config;
 pub mod external;
+mod fast;
 mod fault;
 mod handle;
 mod memory;
 pub mod recording;
 #[cfg(unix)]
 pub mod remote;
-mod shortcut;
 mod stream;
 mod violation;
 

@@ -28,10 +28,10 @@ fn warm(order: Order) -> StepParameters {
 fn boards() -> Vec<BoardConfig> {
     let mut boards = Vec::new();
     for profile in [&FLOAT, &NAIVE] {
-        for (shortcuts, lanes, threads) in [(false, false, 1), (true, true, 1), (true, true, 2)] {
+        for (fast, threads) in [(false, 1), (true, 1), (true, 2)] {
             let inertia = Inertia::World;
             let usual = BoardConfig { profile, inertia, ..BoardConfig::default() };
-            boards.push(BoardConfig { shortcuts, lanes, threads, ..usual });
+            boards.push(BoardConfig { fast, threads, ..usual });
         }
     }
     boards

@@ -8,9 +8,9 @@ use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{HALF, Inertia, PROFILES, Profile};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 
+use crate::common::fast::{Visible, scene, visible};
 use crate::common::scene::{AT_REST, Body, Step};
 use crate::common::sg::Machine;
-use crate::common::shortcuts::{Visible, scene, visible};
 
 /// The thesis' sixteen bits on every stream, arithmetic in f32.
 const THESIS16: Numbers = Numbers {
