@@ -159,15 +159,12 @@ fn an_order_allocates_nothing_once_it_has_seen_a_step_of_that_size() {
     }
 }
 
-/// On the reference board: its short cuts share impulses out among threads by lists that they make
-/// anew.
 #[test]
 fn steps_with_impulses_allocate_nothing_either() {
     let out = StepParameters::default().with_impulses_out(true);
     for name in ["float", "naive"] {
         for parameters in [out, out.with_warm_start(true)] {
-            let config = BoardConfig { shortcuts: false, ..profile(name) };
-            let counted = allocations_with(config, parameters);
+            let counted = allocations_with(profile(name), parameters);
             assert_eq!(counted[3..], [0; 7], "{name}: {counted:?}");
         }
     }

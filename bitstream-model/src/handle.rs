@@ -14,11 +14,11 @@ use crate::axi_dma::PacketCount;
 use crate::board::{Board, Counts};
 use crate::config::{BoardConfig, ConfigError};
 use crate::external::ExternalAccelerator;
+use crate::fast::Fast;
 use crate::fault::FaultPlan;
 use crate::memory::external::DeviceMemory;
 use crate::memory::{DeviceAccess, Memory, MemoryError};
 use crate::recording::Recording;
-use crate::shortcut;
 use crate::violation::{RegisterAccess, Violation};
 use pgs_interface::record::Beat;
 
@@ -76,9 +76,9 @@ impl EmulatedBoard {
         accelerator: Option<Box<dyn ExternalAccelerator>>,
     ) -> Self {
         let board = standard(|| {
-            // A short cut computes as the model does; another accelerator has to compute itself.
-            let short_cut = if accelerator.is_none() { shortcut::of(&config) } else { None };
-            Board::new(config, memory, short_cut, accelerator)
+            // It computes as the model does; another accelerator has to compute itself.
+            let fast = if accelerator.is_none() { Fast::of(&config) } else { None };
+            Board::new(config, memory, fast.map(Box::new), accelerator)
         });
         Self(Arc::new(Mutex::new(board)))
     }
@@ -292,7 +292,10 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError`] if nothing was allocated at `address`, or the device does not own it.
     pub fn take_back(&self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
-        with_board(&self.0, |board| board.take_back(address))
+        with_board(&self.0, |board| {
+            board.catch_up();
+            board.memory.take_back(address)
+        })
     }
 
     /// Frees memory; from then on the device may not touch it.
@@ -300,7 +303,10 @@ impl CpuPort {
     /// # Errors
     /// [`MemoryError::Unknown`] if nothing was allocated at `address`.
     pub fn release(&self, address: u64) -> Result<(), MemoryError> {
-        with_board(&self.0, |board| board.release(address))
+        with_board(&self.0, |board| {
+            board.catch_up();
+            board.memory.release(address)
+        })
     }
 }
 

@@ -4,11 +4,13 @@
 //! follows the contract of [`interface`], as a bitstream does.
 
 mod accelerator;
+mod arbiter;
 mod axi_dma;
 mod board;
 mod cast;
 mod config;
 pub mod external;
+mod fast;
 mod fault;
 mod handle;
 mod memory;
@@ -16,7 +18,6 @@ pub mod recording;
 pub mod reference;
 #[cfg(unix)]
 pub mod remote;
-mod shortcut;
 mod stream;
 mod violation;
 

@@ -35,8 +35,8 @@ pub struct Build {
     /// Threads of this machine for the board's arithmetic; no result depends on their number.
     /// [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) has the driver's own.
     pub threads: Option<usize>,
-    /// Whether the board computes in SIMD lanes; no result depends on it.
-    pub lanes: Option<bool>,
+    /// Whether the board takes a step at once where its host waits for the whole of it; no result depends on it.
+    pub fast: Option<bool>,
 }
 
 impl Build {
@@ -60,7 +60,7 @@ impl Build {
             address_width: self.address_width.unwrap_or(default.address_width),
             fence: self.fence,
             threads: self.threads.unwrap_or(default.threads),
-            lanes: self.lanes.unwrap_or(default.lanes),
+            fast: self.fast.unwrap_or(default.fast),
             ..default
         }
     }
@@ -98,7 +98,7 @@ impl Build {
             address_width: unlike(config.address_width, default.address_width),
             fence: config.fence,
             threads: unlike(config.threads, default.threads),
-            lanes: unlike(config.lanes, default.lanes),
+            fast: unlike(config.fast, default.fast),
         }
     }
 }

@@ -27,7 +27,7 @@
 //! | `address-width` | width of DMA addresses, bits | 40 |
 //! | `fence` | the only memory that the DMA cores reach, as `0x50000000+64M` | none |
 //! | `threads` | threads of this machine for the board's arithmetic; no result depends on them | one per processor, at most 4 |
-//! | `lanes` | compute in SIMD lanes, `on` or `off`; no result depends on it | `on` |
+//! | `fast` | take whole steps at once, `on` or `off`; no result depends on it | `on` |
 //!
 //! [`OpenOptions::emulated`](crate::OpenOptions::emulated) opens such a board. Its builder's
 //! handle, which tells violations and injects faults, is in [`model`](crate::model):

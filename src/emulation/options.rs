@@ -4,7 +4,7 @@ use pgs_interface::profile::{PROFILES, Profile};
 
 use super::build::Build;
 use super::values::{
-    HAZARDS, INERTIA, LANES, PRECISIONS, SUBNORMALS, address_width, bandwidth, bandwidth_text,
+    HAZARDS, INERTIA, PRECISIONS, SUBNORMALS, SWITCH, address_width, bandwidth, bandwidth_text,
     fence, length_width, name_of, named, threads, window,
 };
 
@@ -78,7 +78,7 @@ pub(super) const OPTIONS: [BuildOption; 12] = [
     number!("address-width", address_width, "BITS", address_width, |bits| bits.to_string()),
     number!("fence", fence, "BASE+BYTES", fence, |fence| fence.to_string()),
     number!("threads", threads, "N", threads, |threads| threads.to_string()),
-    choice!("lanes", lanes, LANES, false),
+    choice!("fast", fast, SWITCH, false),
 ];
 
 /// The option of this key.

@@ -26,7 +26,7 @@ fn a_build_is_written_as_it_is_read() {
         "half,binary16,interlocked,window=64,flush,isotropic",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
         "float,fence=0x40000000+512M",
-        "float,bandwidth=17.07,threads=1,lanes=off",
+        "float,bandwidth=17.07,threads=1,fast=off",
     ] {
         let build = build(text).expect(text);
         assert_eq!(build.to_string(), text);
@@ -43,7 +43,7 @@ fn words_may_stand_in_any_order() {
 #[test]
 fn a_word_means_what_the_option_means() {
     let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
-                length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
+                length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
     let expected = Build {
         profile: Profile::by_name("half"),
         arithmetic: Some(Precision::F32),
@@ -56,7 +56,7 @@ fn a_word_means_what_the_option_means() {
         address_width: Some(32),
         fence: Some(Fence::default()),
         threads: Some(3),
-        lanes: Some(false),
+        fast: Some(false),
     };
     assert_eq!(build(text), Ok(expected));
     for key in Build::keys() {
@@ -85,7 +85,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
                 "{:?} is no option of a build: give one of f32, binary16, \
                  interlocked, unchecked, window=SLOTS, keep, flush, \
                  isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
-                 address-width=BITS, fence=BASE+BYTES, threads=N, lanes=on|off",
+                 address-width=BITS, fence=BASE+BYTES, threads=N, fast=on|off",
                 text.split_once(',').expect("two words").1
             )
         );
@@ -134,7 +134,7 @@ fn any_build() -> impl Strategy<Value = Build> {
                 profile: Some(profile),
                 arithmetic,
                 inertia: choices.0,
-                lanes: choices.1,
+                fast: choices.1,
                 hazards,
                 subnormals,
                 window: numbers.0,

@@ -20,7 +20,7 @@ pub(super) const SUBNORMALS: [Named<Subnormals>; 2] =
     [("keep", Subnormals::Keep), ("flush", Subnormals::Flush)];
 pub(super) const INERTIA: [Named<Inertia>; 2] =
     [("isotropic", Inertia::Isotropic), ("world", Inertia::World)];
-pub(super) const LANES: [Named<bool>; 2] = [("on", true), ("off", false)];
+pub(super) const SWITCH: [Named<bool>; 2] = [("on", true), ("off", false)];
 
 /// The value of a name; the error has the expected names.
 pub(super) fn named<T: Copy>(table: &[Named<T>], text: &str) -> Result<T, String> {

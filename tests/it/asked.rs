@@ -10,26 +10,24 @@ use bitstream_model::{BoardConfig, Direction, Fault, FaultKind};
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, Collision, Shape, StepParameters, Velocity};
 
-/// The boards whose bits are the direct solver's: f32 with absolute records; with the short cuts of
-/// the emulation and without.
+/// The boards whose bits are the direct solver's: f32 with absolute records; by the reference
+/// and by the fast way.
 fn boards(shapes: &[Shape]) -> Vec<BoardConfig> {
     let mut boards = Vec::new();
     let isotropic = shapes.iter().all(Shape::is_isotropic);
     let inertia = if isotropic { Inertia::Isotropic } else { Inertia::World };
     let built = |profile: &&Profile| profile.inertias().contains(&inertia);
     for profile in [&FLOAT, &NAIVE].into_iter().filter(built) {
-        for (shortcuts, lanes, threads) in
-            [(false, false, 1), (true, false, 1), (true, true, 1), (true, true, 2)]
-        {
+        for (fast, threads) in [(false, 1), (true, 1), (true, 2)] {
             let mut config = BoardConfig { profile, inertia, ..BoardConfig::default() };
-            (config.shortcuts, config.lanes, config.threads) = (shortcuts, lanes, threads);
+            (config.fast, config.threads) = (fast, threads);
             boards.push(config);
         }
     }
     boards
 }
 
-/// Shapes of any inertia, and the same with equal components, which take the short cuts.
+/// Shapes of any inertia, and the same with equal components, which have f32 alone.
 fn both_inertias() -> [Vec<Shape>; 2] {
     let isotropic = |shape: Shape| Shape::isotropic(shape.inverse_mass, shape.inverse_inertia[0]);
     [shapes().to_vec(), shapes().map(isotropic).to_vec()]
@@ -187,8 +185,8 @@ fn every_body_can_bring_a_mass_of_its_own() {
 #[test]
 fn a_streamed_mass_counts_as_one_of_the_table() {
     let (bodies, collisions) = with_shapes(5, 64);
-    for shortcuts in [false, true] {
-        let config = BoardConfig { shortcuts, inertia: Inertia::World, ..Default::default() };
+    for fast in [false, true] {
+        let config = BoardConfig { fast, inertia: Inertia::World, ..Default::default() };
         let step = |shapes: &[Shape]| {
             let (board, mut accelerator) = open_with(config, None, shapes);
             let mut bodies = bodies.clone();

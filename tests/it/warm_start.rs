@@ -27,9 +27,9 @@ fn warm(order: Order) -> StepParameters {
 
 fn boards() -> Vec<BoardConfig> {
     let mut boards = Vec::new();
-    for (shortcuts, lanes, threads) in [(false, false, 1), (true, true, 1), (true, true, 2)] {
+    for (fast, threads) in [(false, 1), (true, 1), (true, 2)] {
         let usual = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
-        boards.push(BoardConfig { shortcuts, lanes, threads, ..usual });
+        boards.push(BoardConfig { fast, threads, ..usual });
     }
     boards
 }

@@ -37,7 +37,7 @@ if [ $run_tests = yes ]; then
 	time_of attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" \
 		-p zynq-pgs -p bitstream-model --lib
 	time_of attend timeout "${TEST_LIMIT:-1200}" cargo test --release --locked --target "$aarch64" \
-		-p zynq-pgs -p bitstream-model --test it -- shortcuts shortcuts_buffers:: float_environment:: warm_start:: asked::
+		-p zynq-pgs -p bitstream-model --test it -- fast:: float_environment:: warm_start:: asked::
 	# The examples in C and C++, with the static and the shared library. The programs find their loader and
 	# C library where Debian's libc6 of arm64 has them, so that loader and threads are of one C library.
 	need_packages libc6:arm64

@@ -54,7 +54,7 @@ pub(crate) struct Counters {
     pub(crate) stalls: u64,
     pub(crate) waits: u64,
     pub(crate) hazards: u64,
-    pub(super) sum_received: u32,
+    pub(crate) sum_received: u32,
     pub(crate) sum_sent: u32,
     pub(crate) impulse_sum: u64,
 }

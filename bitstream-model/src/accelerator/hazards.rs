@@ -45,7 +45,7 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    pub(super) fn new(hazards: Hazards, interval: u32, per_issue: u32) -> Self {
+    pub(crate) fn new(hazards: Hazards, interval: u32, per_issue: u32) -> Self {
         Self {
             hazards,
             interval: interval.into(),
@@ -61,7 +61,7 @@ impl Pipeline {
     }
 
     /// A step begins.
-    pub(super) fn start_step(&mut self, bodies: usize) {
+    pub(crate) fn start_step(&mut self, bodies: usize) {
         match self.hazards {
             Hazards::Interlocked => {
                 self.ready.clear();
@@ -76,7 +76,7 @@ impl Pipeline {
     }
 
     /// A pass begins; the previous pass has written everything back.
-    pub(super) fn start_pass(&mut self, window: u64) {
+    pub(crate) fn start_pass(&mut self, window: u64) {
         self.window = window;
         self.collisions = 0;
         self.retired = 0;

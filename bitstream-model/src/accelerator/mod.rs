@@ -7,19 +7,17 @@
 //!
 //! `phases.rs` goes through load, passes and integration, `per_record.rs` is what happens to one
 //! record. `records` says where rows lie in
-//! beats and beats on streams, `arithmetic` is that of the words; `control.rs` is the register file.
-//! The accelerator takes what has arrived on the streams, keeps account of the clock cycles that
-//! this costs, and knows nothing of who sent it.
+//! beats and beats on streams, `arithmetic` is that of the words; `control.rs` is the register
+//! file. The accelerator takes what has arrived on the streams, keeps account of the clock cycles
+//! that this costs, and knows nothing of who sent it.
 //!
-//! **Which code runs.** This folder is the reference: it computes a record when it takes it. By
-//! default a board of `float` or `half` is built with the short cuts of
-//! [`shortcut`](crate::shortcut), which take the records through the seam in `defer.rs` instead: a
-//! breakpoint in `solver.rs` is then hardly ever met. To see the reference run, switch them off:
-//! [`BoardConfig::shortcuts`]. Every bit, counter and cycle stays the same.
+//! **Which code runs.** This folder is the reference: it computes a record when it takes it. Where
+//! a host waits for a whole step, the board takes it by [`fast`](crate::fast) instead, with the
+//! same bits. To see the reference run, switch that off: [`BoardConfig::fast`].
 
 pub(crate) mod arithmetic;
+mod at_once;
 pub(crate) mod control;
-pub(crate) mod defer;
 pub(crate) mod hazards;
 pub(crate) mod integrate;
 pub(crate) mod per_record;
@@ -33,7 +31,6 @@ use crate::config::quirks::Resettable;
 use crate::fault::{
     FaultKind, Faults, PassKind, Place, StepPhase, StepShape, end_of_reset, pass_of,
 };
-use crate::memory::Memory;
 use crate::recording::{Stage, StageCounts, StageLog, StageSpan};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
@@ -44,7 +41,6 @@ use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use control::{Arguments, Counters, Registers, Request};
-use defer::Deferral;
 use hazards::Pipeline;
 use records::decode::Collision;
 use records::results::Results;
@@ -77,6 +73,8 @@ pub(crate) struct Ran {
     pub(crate) cycles: u64,
     /// Whether anything but waiting was done.
     pub(crate) progressed: bool,
+    /// All bodies are loaded just now, and the run can go on.
+    pub(crate) loaded: bool,
 }
 
 /// The accelerator.
@@ -287,29 +285,35 @@ impl Accelerator {
         self.counters.waits += cycles;
     }
 
-    /// The phase under way, if nothing can happen in it but that records arrive.
-    pub(crate) fn undisturbed(&self) -> Option<&Phase> {
-        (self.debt == 0 && !self.hung).then_some(&self.phase)
+    /// If all bodies are loaded and no collision has come in: the cycles that the last bodies still
+    /// take.
+    pub(crate) fn loaded(&self) -> Option<u64> {
+        match self.phase {
+            Phase::Pass { number: 0, segment } if segment.done == 0 && !self.hung => {
+                self.stages.is_none().then_some(self.debt)
+            }
+            _ => None,
+        }
     }
 
-    /// Lets cycles pass at once, `waits` of them for want of beats or space. `phase` is the phase under
-    /// way as it is afterwards.
-    pub(crate) fn pass_over(&mut self, cycles: u64, waits: u64, phase: Phase) {
+    /// Ends the step under way, `cycles` from now, with these counters.
+    pub(crate) fn end_after(&mut self, cycles: u64, counters: Counters) {
         self.clock += cycles;
-        self.counters.waits += waits;
-        self.phase = phase;
+        self.debt = 0;
+        self.counters = counters;
+        self.phase = Phase::Idle;
+        self.end_step();
     }
 
     /// Works for up to `limit` cycles on what has arrived, then returns; it returns early when
-    /// there is nothing to do.
+    /// there is nothing to do, and once in each step when all bodies are loaded: then the caller
+    /// goes on with the run, or takes the passes in another way.
     pub(crate) fn run(
         &mut self,
         limit: u64,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
         faults: &mut Faults,
-        memory: &Memory,
-        mut deferral: Deferral<'_>,
     ) -> Ran {
         let mut ran = Ran::default();
         if !self.running() {
@@ -317,7 +321,7 @@ impl Accelerator {
         }
         if std::mem::take(&mut self.start_due) {
             ran.progressed = true;
-            self.start(deferral.as_deref_mut());
+            self.start();
             faults.step_begins(self.step_shape());
         }
         loop {
@@ -332,7 +336,7 @@ impl Accelerator {
             self.note_stage();
             // After it hangs no other fault can happen.
             if !self.hung && !faults.none() {
-                ran.progressed |= self.apply_due_fault(faults, inputs, deferral.as_deref_mut());
+                ran.progressed |= self.apply_due_fault(faults, inputs);
             }
             if self.hung {
                 break;
@@ -340,14 +344,18 @@ impl Accelerator {
             let left = limit - ran.cycles;
             let progress = match self.phase {
                 Phase::Idle | Phase::Failed => break,
-                Phase::Load(segment) => self.load(segment, inputs, memory, deferral.as_deref_mut()),
+                Phase::Load(segment) => match self.load(segment, inputs) {
+                    Ok(true) if matches!(self.phase, Phase::Pass { .. }) => {
+                        (ran.progressed, ran.loaded) = (true, true);
+                        break;
+                    }
+                    loaded => loaded,
+                },
                 Phase::Pass { number, segment } => {
-                    let deferral = deferral.as_deref_mut();
-                    self.pass(number, segment, left, (inputs, outputs), memory, deferral)
+                    self.pass(number, segment, left, (inputs, outputs))
                 }
                 Phase::Integrate { poses, results } => {
-                    let deferral = deferral.as_deref_mut();
-                    self.integrate(poses, results, inputs, outputs, memory, deferral)
+                    self.integrate(poses, results, inputs, outputs)
                 }
                 Phase::Ending => {
                     self.phase = Phase::Idle;
@@ -360,7 +368,6 @@ impl Accelerator {
                 Ok(false) => break,
                 Err(error) => {
                     ran.progressed = true;
-                    self.compute_deferred(deferral.as_deref_mut());
                     self.fail(error.code, error.channel, error.beat);
                 }
             }
@@ -368,8 +375,8 @@ impl Accelerator {
         ran
     }
 
-    /// A step begins on the accelerator that this one shadows: its packets are known, and nothing is
-    /// computed.
+    /// A step begins on the accelerator that this one shadows: its packets are known, and nothing
+    /// is computed.
     pub(crate) fn shadow_start(&mut self, faults: &mut Faults) {
         self.start_due = false;
         self.arguments = self.registers.arguments();
@@ -389,12 +396,7 @@ impl Accelerator {
     }
 
     /// Lets a fault happen whose time has come; returns whether one did.
-    fn apply_due_fault(
-        &mut self,
-        faults: &mut Faults,
-        inputs: &[Stream],
-        deferral: Deferral<'_>,
-    ) -> bool {
+    fn apply_due_fault(&mut self, faults: &mut Faults, inputs: &[Stream]) -> bool {
         let (phase, segment) = match &self.phase {
             Phase::Idle | Phase::Failed => return false,
             Phase::Ending => {
@@ -419,7 +421,6 @@ impl Accelerator {
         let fault = faults.in_accelerator(phase, arrived as u64);
         match fault {
             Some(FaultKind::AcceleratorError { code }) => {
-                self.compute_deferred(deferral);
                 self.fail(code, 0, register(done));
             }
             Some(_) => self.hung = true,
@@ -436,13 +437,6 @@ impl Accelerator {
         self.end_step();
     }
 
-    /// Lets the deferred passes be computed before the pass under way fails.
-    fn compute_deferred(&mut self, deferral: Deferral<'_>) {
-        if let (Phase::Pass { number, segment }, Some(defer)) = (self.phase, deferral) {
-            defer.compute(self, number, segment.done);
-        }
-    }
-
     fn end_step(&mut self) {
         self.counters.cycles = self.clock;
         self.registers.counters = self.counters;
@@ -450,7 +444,7 @@ impl Accelerator {
     }
 
     /// Takes the arguments and starts with the load.
-    fn start(&mut self, deferral: Deferral<'_>) {
+    fn start(&mut self) {
         let arguments = self.registers.arguments();
         self.arguments = arguments;
         self.counters = Counters::default();
@@ -487,11 +481,8 @@ impl Accelerator {
             self.inertias.resize(bodies, arithmetic::inertia::Stored::default());
         }
         let collisions = arguments.collisions as usize;
-        let shapes = self.registers.shapes();
         self.impulses.clear();
-        if !deferral.is_some_and(|defer| defer.begin_step(&arguments, shapes)) {
-            self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
-        }
+        self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
         self.pipeline.start_step(bodies);
         self.phase = Phase::Load(self.velocities_in());
     }

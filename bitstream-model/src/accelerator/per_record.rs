@@ -4,15 +4,16 @@ use super::Accelerator;
 use super::arithmetic::inertia;
 use super::arithmetic::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
 use super::integrate::{Pose, integrate};
+use super::records::array::Row;
 use super::records::decode::{self, Collision};
-use super::records::segment::{PacketError, Reader};
+use super::records::segment::{Beats, PacketError, Reader};
 use super::solver::{self, Impulses, Mass, Velocity};
 use crate::cast::register;
 use crate::config::Subnormals;
 use pgs_interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Inertia;
-use pgs_interface::record::velocity;
+use pgs_interface::record::{result, velocity};
 
 /// Rounds toward zero and saturates, as the accumulator does.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
@@ -65,7 +66,7 @@ impl Accelerator {
     pub(super) fn arrival(
         &self,
         body: usize,
-        reader: &mut Reader<'_>,
+        reader: &mut Reader<'_, impl Beats>,
     ) -> Result<Arrival, PacketError> {
         let format = self.variant.numbers.bodies;
         let ((velocity, shape), inertia, streamed) = match self.variant.inertia {
@@ -105,13 +106,33 @@ impl Accelerator {
 
     /// Mass properties of a loaded body.
     #[inline]
-    pub(super) fn mass_of(&self, body: usize) -> Mass {
+    pub(crate) fn mass_of(&self, body: usize) -> Mass {
         let inertia = self.inertias.get(body).copied().unwrap_or_default();
         let mass = self.mass(self.shape_of[body], inertia);
         match self.inverse_masses.get(body) {
             Some(inverse_mass) => Mass { inverse_mass: *inverse_mass, ..mass },
             None => mass,
         }
+    }
+
+    /// Whether a body moves.
+    #[inline]
+    pub(super) fn moves(&self, body: usize) -> bool {
+        let of_shape = || self.registers.shapes()[usize::from(self.shape_of[body])].inverse_mass;
+        self.inverse_masses.get(body).copied().unwrap_or_else(of_shape) != 0.0
+    }
+
+    /// The record that a body leaves with; its pose is next.
+    #[inline]
+    pub(crate) fn result(
+        &self,
+        body: usize,
+        reader: &mut Reader<'_, impl Beats>,
+    ) -> [Row; result::ROWS] {
+        let format = self.variant.numbers.poses;
+        let pose = decode::pose(format, &reader.record());
+        let (pose, velocity) = self.integrated(self.moves(body), pose, self.velocities[body]);
+        decode::result(format, &pose, &velocity)
     }
 
     /// Mass properties of a body: its shape's, with world inertia its own inertia.

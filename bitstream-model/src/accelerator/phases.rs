@@ -1,19 +1,18 @@
 //! Works through the phases of a step on what has arrived: load, passes, integration.
 
+use std::ops::Range;
+
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
-use super::defer::{ArrivedRecords, Deferral};
 use super::hazards::Entry;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
 use super::records::results::Results;
-use super::records::segment::{PacketError, Reader, Segment};
+use super::records::segment::{Beats, PacketError, Reader, Segment};
 use super::records::striping::Striping;
-use super::solver::Mass;
 use super::{Accelerator, Phase};
 use crate::cast::register;
 use crate::config::{Hazards, Subnormals};
-use crate::memory::Memory;
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
@@ -38,7 +37,7 @@ impl Accelerator {
         Records { format, rows, count: self.arguments.bodies as usize, together: 1 }
     }
 
-    pub(super) fn velocities_in(&self) -> Segment {
+    pub(crate) fn velocities_in(&self) -> Segment {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.velocities, profile.mm2s_widths);
         let records = self.body_records(numbers.bodies, self.variant.velocity_rows());
@@ -46,7 +45,7 @@ impl Accelerator {
     }
 
     /// The poses.
-    pub(super) fn poses_in(&self) -> Segment {
+    pub(crate) fn poses_in(&self) -> Segment {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.poses, profile.mm2s_widths);
         let records = self.body_records(numbers.poses, pose::ROWS);
@@ -54,7 +53,7 @@ impl Accelerator {
     }
 
     /// The collisions of a pass. In a warm pass their impulses follow them.
-    pub(super) fn collisions_in(&self, pass: u32) -> Segment {
+    pub(crate) fn collisions_in(&self, pass: u32) -> Segment {
         let profile = self.variant.profile;
         let (stripe, rows) = match profile.stripes.warm_collisions {
             Some(warm) if self.arguments.is_warm(pass) => (warm, collision::WARM_ROWS),
@@ -70,7 +69,7 @@ impl Accelerator {
         Segment::new(Array::new(striping, records))
     }
 
-    pub(super) fn results_out(&self) -> Results {
+    pub(crate) fn results_out(&self) -> Results {
         let Variant { profile, numbers, .. } = self.variant;
         let striping = Striping::new(&profile.stripes.results, profile.s2mm_widths);
         Results::new(Array::new(striping, self.body_records(numbers.poses, result::ROWS)))
@@ -92,8 +91,6 @@ impl Accelerator {
         &mut self,
         mut segment: Segment,
         inputs: &mut [Stream],
-        memory: &Memory,
-        mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let records = segment.available(inputs);
         if records == 0 {
@@ -101,22 +98,13 @@ impl Accelerator {
         }
         segment.check(records, inputs)?;
         let before = segment.cycles();
-        let mut arrived = ArrivedRecords { records, inputs, memory };
-        let deferred =
-            deferral.as_deref_mut().and_then(|defer| defer.load(self, &mut segment, &mut arrived));
-        let sum = match deferred {
-            Some(sum) => sum?,
-            None => {
-                segment.fetch(records, inputs, memory);
-                self.load_records(&segment, records, inputs)?;
-                segment.advance(records, inputs)
-            }
-        };
+        self.load_records(&segment, records, inputs)?;
+        let sum = segment.advance(records, inputs);
         self.received(sum);
         self.debt += segment.cycles() - before;
         self.phase = Phase::Load(segment);
         if segment.finished() {
-            self.start_pass(0, deferral);
+            self.start_pass(0);
         }
         Ok(true)
     }
@@ -128,8 +116,16 @@ impl Accelerator {
         inputs: &[Stream],
     ) -> Result<(), PacketError> {
         let mut reader = segment.reader(0, inputs);
-        for body in segment.done..segment.done + records {
-            let arrival = self.arrival(body, &mut reader)?;
+        self.load_bodies(segment.done..segment.done + records, &mut reader)
+    }
+
+    pub(super) fn load_bodies(
+        &mut self,
+        bodies: Range<usize>,
+        reader: &mut Reader<'_, impl Beats>,
+    ) -> Result<(), PacketError> {
+        for body in bodies {
+            let arrival = self.arrival(body, reader)?;
             if self.variant.inertia == Inertia::World {
                 self.inertias[body] = arrival.inertia;
             }
@@ -151,19 +147,23 @@ impl Accelerator {
         })
     }
 
-    fn start_pass(&mut self, number: u32, deferral: Deferral<'_>) {
+    /// Cycles between two issues of a pass: longer records may take their streams longer.
+    pub(crate) fn interval(&self, pass: u32) -> u64 {
+        let profile = self.variant.profile;
+        let of_streams = match self.arguments.is_warm(pass) {
+            true => self.collisions_in(pass).cycles_of(profile.collisions_per_issue as usize),
+            false => 0,
+        };
+        u64::from(profile.initiation_interval).max(of_streams)
+    }
+
+    fn start_pass(&mut self, number: u32) {
         if number == self.arguments.passes() {
-            if let Some(defer) = deferral {
-                defer.compute(self, number, 0);
-            }
             let (poses, results) = (self.poses_in(), self.results_out());
             self.phase = Phase::Integrate { poses, results };
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
-        if let Some(defer) = deferral {
-            defer.begin_pass(self.pipeline.depth());
-        }
         self.phase = Phase::Pass { number, segment: self.collisions_in(number) };
     }
 
@@ -174,8 +174,6 @@ impl Accelerator {
         mut segment: Segment,
         limit: u64,
         (inputs, outputs): (&mut [Stream], &mut [Stream]),
-        memory: &Memory,
-        mut deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let mut records = segment.available(inputs);
         let arrived = records;
@@ -193,21 +191,8 @@ impl Accelerator {
             return Ok(false);
         }
         segment.check(records, inputs)?;
-        let deferred = match deferral.as_deref_mut().filter(|defer| defer.takes_collisions()) {
-            Some(defer) => {
-                let arrived = ArrivedRecords { records, inputs, memory };
-                defer.collisions(self, number, &mut segment, limit, arrived, outputs)?
-            }
-            None => None,
-        };
-        let cycles = match deferred {
-            Some(cycles) => cycles,
-            None => {
-                let input =
-                    PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
-                self.solve_arrived(input)?
-            }
-        };
+        let input = PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
+        let cycles = self.solve_arrived(input)?;
         self.debt += cycles;
         self.phase = Phase::Pass { number, segment };
         if segment.finished() {
@@ -215,7 +200,7 @@ impl Accelerator {
                 self.pipeline.finish_pass(&mut self.velocities);
             }
             self.debt += u64::from(self.depth(number).fill);
-            self.start_pass(number + 1, deferral);
+            self.start_pass(number + 1);
         }
         Ok(true)
     }
@@ -258,9 +243,7 @@ impl Accelerator {
         let per_issue = profile.collisions_per_issue as usize;
         let warm = self.arguments.is_warm(number);
         let sends = self.arguments.sends_impulses(number);
-        // Longer records may take their streams longer.
-        let of_streams = if warm { segment.cycles_of(per_issue) } else { 0 };
-        let interval = u64::from(profile.initiation_interval).max(of_streams);
+        let interval = self.interval(number);
         let mut cycles = 0;
         let mut records = 0;
         let mut reader = segment.reader(0, inputs);
@@ -295,9 +278,13 @@ impl Accelerator {
         Ok(cycles)
     }
 
-    /// Reads the collisions of the next issue of a warm pass, padding included: their records, and then the
-    /// impulses of each.
-    fn read_warm_issue(&self, reader: &mut Reader<'_>, together: &mut Vec<Collision>) {
+    /// Reads the collisions of the next issue of a warm pass, padding included: their records, and
+    /// then the impulses of each.
+    pub(super) fn read_warm_issue(
+        &self,
+        reader: &mut Reader<'_, impl Beats>,
+        together: &mut Vec<Collision>,
+    ) {
         let profile = self.variant.profile;
         let format = self.variant.numbers.collisions;
         together.clear();
@@ -329,7 +316,7 @@ impl Accelerator {
 
     /// The next collision.
     #[inline]
-    pub(super) fn collision(&self, reader: &mut Reader<'_>) -> Collision {
+    pub(super) fn collision(&self, reader: &mut Reader<'_, impl Beats>) -> Collision {
         use StreamFormat::{Binary16, F32};
         match self.variant.numbers.collisions {
             F32 if self.arguments.solver.pair_friction => {
@@ -359,10 +346,15 @@ impl Accelerator {
             }
             return Ok(0);
         }
-        let sides = [collision.body_a as usize, collision.body_b as usize];
-        let masses = self.checked::<I>(index, collision, sides)?;
-        let moving = [masses[0].inverse_mass != 0.0, masses[1].inverse_mass != 0.0];
-        let entry = Entry { bodies: [collision.body_a, collision.body_b], moving };
+        let (count, bodies) = collision.head();
+        let entry = self.checked(count, bodies).map_err(|code| PacketError {
+            code,
+            channel: 0,
+            beat: register(index),
+        })?;
+        let Entry { bodies, moving } = entry;
+        let sides = bodies.map(|body| body as usize);
+        let masses = sides.map(|body| self.mass_of(body));
         let stall = if unchecked { 0 } else { self.pipeline.wait(now, &entry) };
 
         let mut velocities = [self.velocities[sides[0]], self.velocities[sides[1]]];
@@ -385,29 +377,24 @@ impl Accelerator {
         Ok(stall)
     }
 
-    /// The mass properties of both bodies, or the reason to refuse the collision.
+    /// The bodies of a collision and which of them move, or the reason to refuse it.
     #[inline]
-    fn checked<I: inertia::Inertia>(
-        &self,
-        index: usize,
-        collision: &Collision,
-        sides: [usize; 2],
-    ) -> Result<[Mass; 2], PacketError> {
-        let error = |code| PacketError { code, channel: 0, beat: register(index) };
-        if collision.count > CONTACT_POINTS {
-            return Err(error(ErrorCode::ContactCount));
+    pub(super) fn checked(&self, count: usize, bodies: [u32; 2]) -> Result<Entry, ErrorCode> {
+        let sides = bodies.map(|body| body as usize);
+        if count > CONTACT_POINTS {
+            return Err(ErrorCode::ContactCount);
         }
         if sides.iter().any(|body| *body >= self.shape_of.len()) {
-            return Err(error(ErrorCode::BodyIndex));
+            return Err(ErrorCode::BodyIndex);
         }
         if sides[0] == sides[1] {
-            return Err(error(ErrorCode::SelfCollision));
+            return Err(ErrorCode::SelfCollision);
         }
-        let [a, b] = sides.map(|body| self.mass_of(body));
-        if a.inverse_mass == 0.0 && b.inverse_mass == 0.0 {
-            return Err(error(ErrorCode::StaticPair));
+        let moving = sides.map(|body| self.moves(body));
+        if moving == [false; 2] {
+            return Err(ErrorCode::StaticPair);
         }
-        Ok([a, b])
+        Ok(Entry { bodies, moving })
     }
 
     /// Integrates the bodies whose poses have arrived and sends their results, a beat a cycle on
@@ -418,8 +405,6 @@ impl Accelerator {
         mut results: Results,
         inputs: &mut [Stream],
         outputs: &mut [Stream],
-        memory: &Memory,
-        deferral: Deferral<'_>,
     ) -> Result<bool, PacketError> {
         let arrived = poses.available(inputs);
         let records = arrived.min(results.room(outputs));
@@ -432,15 +417,8 @@ impl Accelerator {
         poses.check(records, inputs)?;
         let cycles = |poses: &Segment, results: &Results| poses.cycles().max(results.cycles());
         let before = cycles(&poses, &results);
-        let mut arrived = ArrivedRecords { records, inputs, memory };
-        let deferred = deferral.and_then(|defer| {
-            defer.integrate(self, &mut poses, &mut results, &mut arrived, outputs)
-        });
-        let [received, sent] = deferred.unwrap_or_else(|| {
-            poses.fetch(records, inputs, memory);
-            let sent = self.integrate_records(&poses, &mut results, records, inputs, outputs);
-            [poses.advance(records, inputs), sent]
-        });
+        let sent = self.integrate_records(&poses, &mut results, records, inputs, outputs);
+        let received = poses.advance(records, inputs);
         self.received(received);
         self.sent(sent);
         self.debt += cycles(&poses, &results) - before;
@@ -462,16 +440,10 @@ impl Accelerator {
         inputs: &[Stream],
         outputs: &mut [Stream],
     ) -> u32 {
-        let format = self.variant.numbers.poses;
         let mut reader = poses.reader(0, inputs);
         let mut sent = 0_u32;
         for body in poses.done..poses.done + records {
-            let pose = decode::pose(format, &reader.record());
-            let velocity = self.velocities[body];
-            let moves = self.mass_of(body).inverse_mass != 0.0;
-            let (pose, velocity) = self.integrated(moves, pose, velocity);
-            let sum = results.send(&decode::result(format, &pose, &velocity), outputs);
-            sent = sent.wrapping_add(sum);
+            sent = sent.wrapping_add(results.send(&self.result(body, &mut reader), outputs));
         }
         sent
     }

@@ -22,17 +22,6 @@ pub(crate) struct Mass {
     pub(crate) inverse_inertia: Stored,
 }
 
-impl Mass {
-    /// The mass properties in numbers of a format.
-    pub(crate) fn rounded<F: Format>(&self) -> Self {
-        let round = |number| Number::<F>::new(number).value();
-        Self {
-            inverse_mass: round(self.inverse_mass),
-            inverse_inertia: self.inverse_inertia.map(round),
-        }
-    }
-}
-
 /// Velocities of a body, as they lie in block RAM.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Velocity {
@@ -55,21 +44,6 @@ pub(crate) struct SolverParameters {
     pub(crate) spin_damping: f32,
     /// Whether each collision has a friction of its own, in place of `friction`.
     pub(crate) pair_friction: bool,
-}
-
-impl SolverParameters {
-    /// The parameters in numbers of a format.
-    pub(crate) fn rounded<F: Format>(&self) -> Self {
-        let round = |number| Number::<F>::new(number).value();
-        Self {
-            time_step: round(self.time_step),
-            drift: round(self.drift),
-            coefficient: round(self.coefficient),
-            friction: round(self.friction),
-            spin_damping: round(self.spin_damping),
-            pair_friction: self.pair_friction,
-        }
-    }
 }
 
 /// Inverse mass and inertia in numbers of a format.

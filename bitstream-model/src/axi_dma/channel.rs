@@ -62,6 +62,8 @@ pub(super) struct Channel {
     transition: Option<(u64, Transition)>,
     pub(super) idle: bool,
     pub(super) current: u64,
+    /// The first descriptor since it had no work.
+    pub(super) first: u64,
     pub(super) tail: u64,
     pub(super) address: u64,
     pub(super) length: u32,
@@ -90,6 +92,7 @@ impl Channel {
             transition: None,
             idle: false,
             current: 0,
+            first: 0,
             tail: 0,
             address: 0,
             length: 0,
@@ -126,6 +129,13 @@ impl Channel {
             Work::Descriptor(_) | Work::Direct { .. } => !waits,
         };
         !works && self.faulty.late.is_empty() && !self.faulty.extra && !self.faulty.discards
+    }
+
+    /// Whether nothing but beats can happen on the channel: it runs plainly, and no timer runs out.
+    pub(super) fn is_plain(&self) -> bool {
+        let odd = dmacr::KEYHOLE.mask() | dmacr::CYCLIC_BD.mask() | dmacr::IRQ_DELAY.mask();
+        let runs = dmacr::RS.is_set(self.control) && !self.halted;
+        runs && self.control & odd == 0 && self.transition.is_none() && self.faulty.none()
     }
 
     /// Whether an error has stopped the channel.
@@ -274,6 +284,7 @@ impl Channel {
         if matches!(self.work, Work::None) {
             self.idle = false;
             let address = self.resume.unwrap_or(self.current);
+            self.first = address;
             self.work = Work::Fetch { address, ready_at: now + build.delays.descriptor_fetch };
         }
         true

@@ -2,16 +2,16 @@
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
 //! that fetches descriptors and moves beats, `faults.rs` the effects of faults on both. Both
-//! directions are one piece of code. `undisturbed.rs` is the interface for the short cuts: it finds
-//! channels in which only beats flow, and moves many beats on such a channel at once.
+//! directions are one piece of code. `chain.rs` is for [`fast`](crate::fast): the buffers of a whole chain,
+//! and a chain that passes at once.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
+pub(crate) mod chain;
 mod channel;
 mod effects;
 mod faults;
 mod mover;
-mod undisturbed;
 
 use crate::config::beat_cycles;
 use crate::config::quirks::{Master, Resettable};
@@ -89,8 +89,8 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) log: &'a mut Log,
     pub(crate) moved: &'a mut Moved,
     pub(crate) faults: &'a mut Faults,
-    /// Whether the receiver takes beats by reference: they stay in their buffer.
-    pub(crate) by_reference: bool,
+    /// Whether beats are counted and not moved: a whole step has read and written them already.
+    pub(crate) counts_only: bool,
     /// Takes notes, if the board is to be recorded.
     pub(crate) recorder: Option<&'a mut Recorder>,
 }
@@ -245,6 +245,14 @@ impl Core {
     pub(crate) fn running(&self) -> bool {
         let works = |channel: &Channel| !matches!(channel.work, Work::None);
         works(&self.mm2s) || works(&self.s2mm)
+    }
+
+    /// Whether the engine of a channel has no work.
+    pub(crate) fn rests(&self, direction: Direction) -> bool {
+        match direction {
+            Direction::Mm2s => self.mm2s.rests(),
+            Direction::S2mm => self.s2mm.rests(),
+        }
     }
 
     /// Whether an enabled interrupt stands.

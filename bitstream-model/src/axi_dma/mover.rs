@@ -10,7 +10,6 @@ use super::{Build, PacketCount, Surroundings};
 use crate::cast::register;
 use crate::config::quirks::Master;
 use crate::fault::FaultKind;
-use crate::memory::Denied;
 use crate::recording::{MovedBeats, Recorder};
 use crate::stream::Stream;
 use crate::violation::ViolationKind;
@@ -274,8 +273,16 @@ impl Channel {
         let fenced_off = !build.reaches(Master::Data(self.direction), at, n * BEAT_BYTES);
         let denied = match self.direction {
             direction if fenced_off => with.memory.check(direction, at, n).err(),
-            Direction::Mm2s if with.by_reference && mask == 0 && !self.faulty.cut => {
-                self.refer(at, n, stream, with).err()
+            Direction::Mm2s if with.counts_only => {
+                stream.pass(n);
+                with.moved.beats_read += n as u64;
+                None
+            }
+            Direction::S2mm if with.counts_only => {
+                let ends = stream.next_last() == Some(n - 1);
+                stream.pop(n);
+                with.moved.beats_written += n as u64;
+                return Some(ends && self.ends_packet(build, with));
             }
             Direction::Mm2s => match with.memory.beats(at, n) {
                 Ok(_) if self.faulty.cut => None,
@@ -330,22 +337,6 @@ impl Channel {
             stream.mark_partial();
         }
         Some(whole && last)
-    }
-
-    /// MM2S: puts beats on the stream, by reference unless their memory may change at any time.
-    fn refer(
-        &self,
-        at: u64,
-        n: usize,
-        stream: &mut Stream,
-        with: &mut Surroundings<'_>,
-    ) -> Result<(), Denied> {
-        match with.memory.source(at, n)? {
-            Some(source) => stream.push_span(source, n),
-            None => stream.push(with.memory.beats(at, n)?),
-        }
-        with.moved.beats_read += n as u64;
-        Ok(())
     }
 
     fn keyhole_address(&self, at: u64) -> u64 {

@@ -3,28 +3,25 @@
 //! Time passes with each register access, and while the CPU waits; nothing happens inside a
 //! register write. The clock is the accelerator's; the DMAs run on it too.
 
-pub(crate) mod arbiter;
 mod bus;
 mod interrupt;
-pub(crate) mod short_cut;
 
-use self::arbiter::{Arbiter, Turn};
 use self::bus::Target;
 use self::interrupt::InterruptLine;
-use self::short_cut::{ShortCut, Stretch};
-use crate::accelerator::Accelerator;
+use crate::accelerator::{Accelerator, Ran};
+use crate::arbiter::{Arbiter, Turn};
 use crate::axi_dma::{Core, Moved, PacketCount, Surroundings, WriteContext};
 use crate::config::BoardConfig;
 use crate::config::quirks::InterruptWiring;
 use crate::external::{ExternalAccelerator, ExternalError, Installed};
+use crate::fast::{Fast, Parts};
 use crate::fault::{Fault, FaultKind, Faults};
-use crate::memory::{Memory, MemoryError};
+use crate::memory::Memory;
 use crate::recording::{Recorder, Recording};
 use crate::stream::Stream;
 use crate::violation::{Log, RegisterAccess, ViolationKind};
 use pgs_interface::axi_dma::Direction;
 use pgs_interface::control::IDENTIFICATION;
-use pgs_interface::record::Beat;
 
 /// Cycles between two polls of the streams by a waiting accelerator.
 pub(crate) const STARVED_CYCLES: u64 = 64;
@@ -75,17 +72,22 @@ pub(crate) struct Board {
     arbiter: Arbiter,
     turn: Turn,
     /// `None`: the board moves and computes everything slice by slice.
-    short_cut: Option<Box<dyn ShortCut>>,
+    fast: Option<Box<Fast>>,
+    /// The run in which the fast way has taken the step: the cycle at which it began, and its
+    /// cycles so far.
+    taken: Option<(u64, u64)>,
+    /// Cycles of a run that the reference goes on with.
+    ran: u64,
     recorder: Option<Box<Recorder>>,
 }
 
 impl Board {
-    /// Builds a board with the built-in accelerator, with a short cut or without, or with another
-    /// accelerator, which no short cut knows.
+    /// Builds a board with the built-in accelerator, with the fast way or without, or with another
+    /// accelerator, which has to compute itself.
     pub(crate) fn new(
         config: BoardConfig,
         memory: Memory,
-        short_cut: Option<Box<dyn ShortCut>>,
+        fast: Option<Box<Fast>>,
         external: Option<Box<dyn ExternalAccelerator>>,
     ) -> Self {
         let profile = config.profile;
@@ -112,12 +114,15 @@ impl Board {
             counts: Counts::default(),
             arbiter: Arbiter::new(&config, cores),
             turn: Turn::default(),
-            short_cut,
+            fast,
+            taken: None,
+            ran: 0,
             recorder: None,
         }
     }
 
-    pub(crate) fn counts(&self) -> Counts {
+    pub(crate) fn counts(&mut self) -> Counts {
+        self.catch_up();
         Counts {
             interrupts: self.interrupt.rising_edges,
             beats_read: self.moved.beats_read,
@@ -130,6 +135,7 @@ impl Board {
     }
 
     pub(crate) fn inject(&mut self, fault: Fault) {
+        self.catch_up();
         self.faults.inject(fault);
     }
 
@@ -148,12 +154,14 @@ impl Board {
     }
 
     /// The packets that ended since the last step began.
-    pub(crate) fn packets(&self) -> &[PacketCount] {
+    pub(crate) fn packets(&mut self) -> &[PacketCount] {
+        self.catch_up();
         &self.moved.packets
     }
 
     /// Records from now on.
     pub(crate) fn start_recording(&mut self) {
+        self.catch_up();
         let clock = (self.config.profile.clock_khz, self.access_cycles());
         let level = self.interrupt.level();
         let recorder = Recorder::new(self.now, clock, self.cores.len(), level);
@@ -221,6 +229,7 @@ impl Board {
     }
 
     pub(crate) fn read32(&mut self, address: u64) -> u32 {
+        self.catch_up();
         self.counts.register_reads += 1;
         self.advance(self.now + self.access_cycles(), false);
         self.apply_due_faults(true);
@@ -252,6 +261,7 @@ impl Board {
     }
 
     pub(crate) fn write32(&mut self, address: u64, value: u32) {
+        self.catch_up();
         self.counts.register_writes += 1;
         self.advance(self.now + self.access_cycles(), false);
         self.apply_due_faults(true);
@@ -321,17 +331,24 @@ impl Board {
                 break;
             }
             self.tick();
-            self.fast_forward(until);
+            if self.taken.is_some() {
+                self.pass_taken_step(until);
+                continue;
+            }
             let event = self.next_event().map_or(until, |event| event.min(until));
             let limit = event - self.now;
             if self.accelerator.starts() {
                 self.moved.packets.clear();
                 self.accelerator.model.step_begins_at(self.now);
             }
-            let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
-            let deferral = self.short_cut.as_mut().map(|short_cut| short_cut.defer());
-            let (faults, memory) = (&mut self.faults, &self.memory);
-            let ran = self.accelerator.run(limit, inputs, outputs, faults, memory, deferral);
+            let mut ran = self.run_accelerator(limit);
+            if ran.loaded {
+                if self.takes_step(ran.cycles, until, watch) {
+                    continue;
+                }
+                self.ran = ran.cycles;
+                ran = Ran { progressed: true, ..self.run_accelerator(limit) };
+            }
             if let (Some(recorder), Some(sent)) =
                 (&mut self.recorder, self.accelerator.model.sent_at())
             {
@@ -361,56 +378,78 @@ impl Board {
         self.log.at(self.now);
     }
 
-    /// Takes the short cut until shortly before `until`, if the board has one and only beats and
-    /// records flow.
-    fn fast_forward(&mut self, until: u64) {
-        let Some(short_cut) = &mut self.short_cut else { return };
+    /// Lets the accelerator work for up to `limit` cycles; a run that has begun before goes on.
+    fn run_accelerator(&mut self, limit: u64) -> Ran {
+        let before = std::mem::take(&mut self.ran);
+        let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
+        let left = limit.saturating_sub(before);
+        let ran = self.accelerator.run(left, inputs, outputs, &mut self.faults);
+        Ran { cycles: before + ran.cycles, ..ran }
+    }
+
+    /// Takes the whole rest of a step at once, if the board can, and the host does nothing until
+    /// its end or waits for the interrupt. The accelerator has run for some cycles from now on.
+    fn takes_step(&mut self, ran: u64, until: u64, waits: bool) -> bool {
         // A recording has the clock of every beat.
         let undisturbed = self.recorder.is_none()
-            && self.faults.none()
+            && self.faults.spare_this_step()
             && self.config.quirks.unconnected.is_none()
-            && self.inputs.iter().chain(&self.outputs).all(|stream| !stream.marked())
-            && self.interrupt.next_event().is_none()
-            && self.cores.len() == self.inputs.len();
-        if !undisturbed {
+            && self.interrupt.next_event().is_none();
+        let taken =
+            undisturbed && self.with_fast(|fast, board| fast.take(ran, until, waits, board));
+        self.taken = taken.then_some((self.now, ran));
+        taken
+    }
+
+    /// Lets time pass while a step is under way that was taken at once; at its end it is to be
+    /// seen.
+    fn pass_taken_step(&mut self, until: u64) {
+        let end = self.fast.as_ref().and_then(|fast| fast.end()).unwrap_or(self.now);
+        self.now = end.min(until);
+        if self.now < end {
             return;
         }
-        let cycles = short_cut.fast_forward(Stretch {
+        if self.with_fast(Fast::finish) {
+            self.taken = None;
+            self.tick();
+            self.update_interrupt();
+        } else {
+            self.catch_up();
+        }
+    }
+
+    /// Has the reference take the step up to now that the fast way has taken, so that a host or an
+    /// observer who acts before its end finds the state of the reference at this cycle, and none
+    /// other.
+    pub(crate) fn catch_up(&mut self) {
+        let Some((from, ran)) = self.taken.take() else { return };
+        if let Some(fast) = &mut self.fast {
+            fast.forget(&mut self.accelerator.model, &self.memory);
+        }
+        let now = std::mem::replace(&mut self.now, from);
+        self.ran = ran;
+        self.advance(now, false);
+    }
+
+    fn with_fast(&mut self, act: impl FnOnce(&mut Fast, &mut Parts<'_>) -> bool) -> bool {
+        let Some(fast) = &mut self.fast else { return false };
+        let mut parts = Parts {
             now: self.now,
-            until,
             accelerator: &mut self.accelerator.model,
             cores: &mut self.cores,
             inputs: &mut self.inputs,
             outputs: &mut self.outputs,
-            memory: &mut self.memory,
-            moved: &mut self.moved,
             arbiter: self.arbiter,
-            turn: &mut self.turn,
-        });
-        if cycles > 0 {
-            self.now += cycles;
-            self.log.at(self.now);
-        }
-    }
-
-    /// Moves a buffer back to the CPU. Beats of it that are still referenced are copied into their
-    /// streams first.
-    pub(crate) fn take_back(&mut self, address: u64) -> Result<Box<[Beat]>, MemoryError> {
-        self.fetch();
-        self.memory.take_back(address)
-    }
-
-    /// Frees memory.
-    pub(crate) fn release(&mut self, address: u64) -> Result<(), MemoryError> {
-        self.fetch();
-        self.memory.release(address)
-    }
-
-    /// Copies the beats that the streams reference into the streams.
-    fn fetch(&mut self) {
-        for stream in &mut self.inputs {
-            stream.fetch(stream.len(), &self.memory);
-        }
+            with: Surroundings {
+                memory: &mut self.memory,
+                log: &mut self.log,
+                moved: &mut self.moved,
+                faults: &mut self.faults,
+                counts_only: false,
+                recorder: None,
+            },
+        };
+        act(fast, &mut parts)
     }
 
     fn tick(&mut self) {
@@ -463,7 +502,7 @@ impl Board {
             log: &mut self.log,
             moved: &mut self.moved,
             faults: &mut self.faults,
-            by_reference: self.short_cut.as_mut().is_some_and(|of| of.defer().takes_collisions()),
+            counts_only: false,
             recorder: self.recorder.as_deref_mut(),
         };
         self.cores[number].run(direction, start, end, limit, stream, &mut with)

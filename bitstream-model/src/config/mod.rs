@@ -140,15 +140,12 @@ pub struct BoardConfig {
     pub delays: Delays,
     /// Mistakes in the build.
     pub quirks: Quirks,
-    /// Threads of the host for the short cuts' arithmetic, with the caller's thread. Like the next
-    /// two options it changes no result, counter or cycle.
+    /// Threads of the host for the fast way's arithmetic, with the caller's thread. They change no result
+    /// and no counter.
     pub threads: usize,
-    /// Whether SIMD lanes compute collisions without a common body, and bodies, if the host has
-    /// them.
-    pub lanes: bool,
-    /// Whether the board takes the short cuts of its design: collisions are decoded once a step,
-    /// passes compute many collisions at a time, and undisturbed time passes at once.
-    pub shortcuts: bool,
+    /// Whether the board takes a step at once where its host waits for the whole of it. That changes no
+    /// result, and of the counters the cycles of waits alone.
+    pub fast: bool,
 }
 
 impl Default for BoardConfig {
@@ -172,8 +169,7 @@ impl Default for BoardConfig {
             delays: Delays::default(),
             quirks: Quirks::default(),
             threads: threads_of_host(),
-            lanes: true,
-            shortcuts: true,
+            fast: true,
         }
     }
 }

@@ -18,10 +18,8 @@ pub use crate::stream::StreamBeat;
 use std::fmt;
 use std::time::Duration;
 
-use crate::accelerator::defer::Deferral;
 use crate::accelerator::{Accelerator, Ran};
 use crate::fault::Faults;
-use crate::memory::Memory;
 use crate::stream::Stream;
 use crate::violation::Log;
 use pgs_interface::control::{AP_CTRL, RESET, ap_ctrl, reset};
@@ -269,18 +267,11 @@ impl External {
     }
 
     /// Works for up to `limit` cycles on the beats that have arrived.
-    pub(crate) fn run(
-        &mut self,
-        limit: u64,
-        inputs: &mut [Stream],
-        outputs: &mut [Stream],
-        memory: &Memory,
-    ) -> Ran {
+    pub(crate) fn run(&mut self, limit: u64, inputs: &mut [Stream], outputs: &mut [Stream]) -> Ran {
         self.starts = false;
         let mut offer = Offer::default();
         for stream in &mut *inputs {
             let beats = stream.len().min(OFFERED_BEATS);
-            stream.fetch(beats, memory);
             offer.beats.push(stream.marked_beats(beats));
         }
         offer.space.extend(outputs.iter().map(Stream::space));
@@ -300,7 +291,7 @@ impl External {
                 }
             }
         }
-        Ran { cycles: clocked.clocks.into(), progressed: clocked.clocks > 0 }
+        Ran { cycles: clocked.clocks.into(), progressed: clocked.clocks > 0, loaded: false }
     }
 }
 
@@ -390,15 +381,13 @@ impl Installed {
         inputs: &mut [Stream],
         outputs: &mut [Stream],
         faults: &mut Faults,
-        memory: &Memory,
-        deferral: Deferral<'_>,
     ) -> Ran {
         let Some(external) = &mut self.external else {
-            return self.model.run(limit, inputs, outputs, faults, memory, deferral);
+            return self.model.run(limit, inputs, outputs, faults);
         };
         if external.starts() {
             self.model.shadow_start(faults);
         }
-        if external.busy() { external.run(limit, inputs, outputs, memory) } else { Ran::default() }
+        if external.busy() { external.run(limit, inputs, outputs) } else { Ran::default() }
     }
 }

@@ -5,12 +5,11 @@ use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::accelerator::Accelerator;
 use crate::config::{BoardConfig, ConfigError};
 use crate::fault::Faults;
-use crate::memory::Memory;
 use crate::stream::Stream;
 use crate::violation::Log;
 use pgs_interface::record::Beat;
 
-/// The model as an accelerator by itself. It computes as the reference does, without short cuts.
+/// The model as an accelerator by itself. It computes as the reference does.
 #[derive(Debug)]
 pub struct ModelAccelerator {
     accelerator: Accelerator,
@@ -18,7 +17,6 @@ pub struct ModelAccelerator {
     outputs: Vec<Stream>,
     log: Log,
     faults: Faults,
-    memory: Memory,
     now: u64,
 }
 
@@ -38,7 +36,6 @@ impl ModelAccelerator {
             outputs: streams(config.profile.s2mm_widths),
             log: Log::new(),
             faults: Faults::default(),
-            memory: Memory::of(config),
             now: 0,
         })
     }
@@ -76,15 +73,17 @@ impl ExternalAccelerator for ModelAccelerator {
             }
             taken.push(room);
         }
-        let ran = self.accelerator.run(
-            limit.into(),
-            &mut self.inputs,
-            &mut self.outputs,
-            &mut self.faults,
-            &self.memory,
-            None,
-        );
-        let idle = u64::from(limit) - ran.cycles;
+        let mut cycles = 0;
+        loop {
+            let left = u64::from(limit) - cycles;
+            let (inputs, outputs) = (&mut self.inputs, &mut self.outputs);
+            let ran = self.accelerator.run(left, inputs, outputs, &mut self.faults);
+            cycles += ran.cycles;
+            if !ran.loaded {
+                break;
+            }
+        }
+        let idle = u64::from(limit) - cycles;
         if self.accelerator.running() {
             self.accelerator.starve(idle);
         }

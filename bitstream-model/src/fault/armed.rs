@@ -49,6 +49,10 @@ struct Armed {
 pub(crate) struct Faults {
     armed: Vec<Armed>,
     happened: u64,
+    /// How many had happened when this step began.
+    before: u64,
+    /// Whether any has happened since the step before began.
+    since: bool,
     /// Starts of the accelerator.
     starts: u64,
     /// Starts of each receiver: one a step, before the accelerator's.
@@ -83,8 +87,16 @@ impl Faults {
         self.armed.is_empty()
     }
 
+    /// Whether no fault can act in this step: none is pending, and none has left its effect in the
+    /// streams since the step before began.
+    pub(crate) fn spare_this_step(&self) -> bool {
+        self.none() && !self.since && self.happened == self.before
+    }
+
     /// A step begins.
     pub(crate) fn step_begins(&mut self, shape: StepShape) {
+        self.since = self.happened != self.before;
+        self.before = self.happened;
         self.starts += 1;
         self.sent = Default::default();
         self.shape = shape;

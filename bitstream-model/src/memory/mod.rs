@@ -9,7 +9,6 @@
 //! A board can be built on external memory instead (`external.rs`); then it allocates none.
 
 pub(crate) mod external;
-mod lend;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -95,24 +94,6 @@ pub enum Denied {
     NoAnswer,
 }
 
-/// Beats in a buffer that the device reads. They stay as they are while the device owns the buffer.
-/// Each hand-over makes new sources, so that beats of equal sources are equal. No buffer has the
-/// default source.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Source {
-    /// Address of the first beat.
-    address: u64,
-    /// Number of the hand-over.
-    grant: u64,
-}
-
-impl Source {
-    /// The source that begins `beats` beats further on.
-    pub(crate) fn further(self, beats: u64) -> Self {
-        Self { address: self.address + beats * BEAT_BYTES as u64, ..self }
-    }
-}
-
 #[derive(Debug)]
 enum Content {
     Cpu,
@@ -125,8 +106,6 @@ enum Content {
 struct Region {
     bytes: u64,
     content: Content,
-    /// The number of its last hand-over.
-    grant: u64,
     /// The buffer as the CPU's caches hold it, if they differ from memory.
     cached: Option<Box<[Beat]>>,
 }
@@ -164,8 +143,6 @@ pub(crate) struct Memory {
     address_limit: u64,
     next_is_high: bool,
     coherency: Coherency,
-    /// Hand-overs so far.
-    grants: u64,
     /// External memory, which replaces all ranges.
     external: Option<ExternalMemory>,
 }
@@ -195,7 +172,6 @@ impl Memory {
             address_limit: if address_width >= 64 { u64::MAX } else { 1 << address_width },
             next_is_high: false,
             coherency,
-            grants: 0,
             external: None,
         }
     }
@@ -212,7 +188,6 @@ impl Memory {
             address_limit: 0,
             next_is_high: false,
             coherency: Coherency::Coherent,
-            grants: 0,
             external: Some(ExternalMemory::new(memory, granted)),
         }
     }
@@ -239,7 +214,7 @@ impl Memory {
 
     fn place(&mut self, address: u64, bytes: u64, content: Content) {
         let position = self.regions.partition_point(|(start, _)| *start < address);
-        let region = Region { bytes, content, grant: 0, cached: None };
+        let region = Region { bytes, content, cached: None };
         self.regions.insert(position, (address, region));
     }
 
@@ -319,8 +294,6 @@ impl Memory {
         access: DeviceAccess,
     ) -> Result<(), MemoryError> {
         let coherency = self.coherency;
-        self.grants += 1;
-        let grant = self.grants;
         let region = self.region_at(address)?;
         if !matches!(region.content, Content::Cpu) {
             return Err(MemoryError::State { address, state: "the CPU does not own it" });
@@ -340,7 +313,6 @@ impl Memory {
             _ => beats,
         };
         region.content = Content::Device(visible, access, granted);
-        region.grant = grant;
         Ok(())
     }
 
@@ -404,27 +376,20 @@ impl Memory {
         if let Some(ref mut external) = self.external {
             return external.read(address, count);
         }
-        self.owned(address, count).map(|(_, beats)| beats)
+        self.owned(address, count)
     }
 
-    /// The source of beats that the device reads; `None` in external memory, which may change at
-    /// any time. The address is a multiple of a beat.
-    pub(crate) fn source(&self, address: u64, count: usize) -> Result<Option<Source>, Denied> {
+    /// Beats that the device reads; `None` where it may not, and in external memory, which may
+    /// change at any time. The address is a multiple of a beat.
+    pub(crate) fn view(&self, address: u64, count: usize) -> Option<&[Beat]> {
         if self.external.is_some() {
-            return Ok(None);
+            return None;
         }
-        let grant = self.owned(address, count).map(|(region, _)| region.grant)?;
-        Ok(Some(Source { address, grant }))
-    }
-
-    /// Beats of a source, if the device still owns its buffer.
-    pub(crate) fn view(&self, from: Source, count: usize) -> Option<&[Beat]> {
-        let (region, beats) = self.owned(from.address, count).ok()?;
-        (region.grant == from.grant).then_some(beats)
+        self.owned(address, count).ok()
     }
 
     /// Beats that the device reads in a buffer that it owns.
-    fn owned(&self, address: u64, count: usize) -> Result<(&Region, &[Beat]), Denied> {
+    fn owned(&self, address: u64, count: usize) -> Result<&[Beat], Denied> {
         let (region, offset) = self.find(address, (count * BEAT_BYTES) as u64)?;
         match &region.content {
             Content::Cpu => Err(Denied::CpuOwned),
@@ -432,7 +397,7 @@ impl Memory {
             Content::Device(_, DeviceAccess::Write, _) => Err(Denied::Direction),
             Content::Device(beats, DeviceAccess::Read, granted) => {
                 let range = granted_range(beats, *granted, offset, count).ok_or(Denied::PastEnd)?;
-                Ok((region, &beats[range]))
+                Ok(&beats[range])
             }
         }
     }
@@ -464,7 +429,8 @@ impl Memory {
         }
     }
 
-    /// Whether the device may write these beats in a buffer that it owns, and the fence is no matter.
+    /// Whether the device may write these beats in a buffer that it owns, and the fence is no
+    /// matter.
     pub(crate) fn may_write(&self, address: u64, count: usize) -> bool {
         let Ok((region, offset)) = self.find(address, (count * BEAT_BYTES) as u64) else {
             return false;

@@ -1,17 +1,12 @@
 //! An AXI4-Stream with a FIFO of 128-bit beats: beats, TLAST, back-pressure.
 //!
 //! A narrower stream carries a beat in several cycles; that is the mover's and the accelerator's
-//! business, here a beat is a beat. The FIFO holds a beat itself, or a reference to the buffer that
-//! the beat comes from: a receiver that wants the bytes reads them there.
-
-pub(crate) mod span;
+//! business, here a beat is a beat.
 
 use std::collections::VecDeque;
 use std::fmt;
 
-use self::span::Spans;
 use crate::cast::index;
-use crate::memory::{Memory, Source};
 use pgs_interface::record::Beat;
 
 /// A beat of a stream with its marks.
@@ -35,8 +30,6 @@ pub(crate) struct Stream {
     /// Numbers of the beats with TLAST, and of the beats with invalid bytes (TKEEP).
     lasts: VecDeque<u64>,
     partials: VecDeque<u64>,
-    /// References to beats that are not in the ring, in order.
-    spans: Spans,
 }
 
 /// Sum of all words.
@@ -64,7 +57,6 @@ impl Stream {
             put: 0,
             lasts: VecDeque::with_capacity(64),
             partials: VecDeque::new(),
-            spans: Spans::with_capacity(64),
         }
     }
 
@@ -73,12 +65,6 @@ impl Stream {
         self.put = 0;
         self.lasts.clear();
         self.partials.clear();
-        self.spans.clear();
-    }
-
-    /// Beats that the FIFO holds.
-    pub(crate) fn depth(&self) -> usize {
-        self.depth
     }
 
     /// Beats in the FIFO.
@@ -109,45 +95,23 @@ impl Stream {
         self.ring[..beats.len() - first].copy_from_slice(&beats[first..]);
     }
 
-    /// Puts beats in by reference: they stay where they are. They may exceed the space if the excess
-    /// is taken again at once.
-    pub(crate) fn push_span(&mut self, source: Source, count: usize) {
-        self.spans.push(self.put, count as u64, source);
-        self.put += count as u64;
+    /// A stream whose beats are counted, and whose words nobody reads.
+    pub(crate) fn unread() -> Self {
+        Self { depth: usize::MAX, ..Self::new(1) }
     }
 
-    /// The first piece of the `most` beats from `ahead` places behind the front on: its length, and
-    /// where it lies if it lies in a buffer and not in the FIFO itself.
-    pub(crate) fn piece(&self, ahead: usize, most: usize) -> (usize, Option<Source>) {
-        let first = self.taken + ahead as u64;
-        self.spans.piece(first, (first + most as u64).min(self.put))
-    }
-
-    /// Copies the next `beats` beats into the FIFO, where it holds references to them.
-    pub(crate) fn fetch(&mut self, beats: usize, memory: &Memory) {
-        let end = self.taken + (beats as u64).min(self.put - self.taken);
-        while let Some(span) = self.spans.front().filter(|span| span.first < end) {
-            let end = span.end().min(end);
-            let from = memory.view(span.source, index(end - span.first));
-            debug_assert!(
-                from.is_some(),
-                "the board fetches the beats of a buffer before it gives it back"
-            );
-            if let Some(from) = from {
-                self.copy_in(span.first, from);
-            }
-            self.spans.drop_to(end);
+    /// Puts a packet of unread beats in.
+    pub(crate) fn expect_packet(&mut self, beats: usize) {
+        self.put += beats as u64;
+        if beats > 0 {
+            self.mark_last();
         }
     }
 
-    /// Whether it holds references.
-    pub(crate) fn refers(&self) -> bool {
-        !self.spans.is_empty()
-    }
-
-    /// Whether a beat carries a mark.
-    pub(crate) fn marked(&self) -> bool {
-        !(self.lasts.is_empty() && self.partials.is_empty())
+    /// Lets unread beats in and out again.
+    pub(crate) fn pass(&mut self, count: usize) {
+        self.put += count as u64;
+        self.taken = self.put;
     }
 
     /// Marks the newest beat with TLAST.
@@ -197,8 +161,7 @@ impl Stream {
         self.partials.front().map(|number| index(number - self.taken))
     }
 
-    /// Takes `beats` beats out, with their marks, and returns the sum of their words. The FIFO must
-    /// hold the beats themselves.
+    /// Takes `beats` beats out, with their marks, and returns the sum of their words.
     pub(crate) fn take_sum(&mut self, beats: usize) -> u32 {
         assert!(beats <= self.len(), "the receiver looks at the length first");
         let at = self.slot(self.taken);
@@ -217,7 +180,6 @@ impl Stream {
                 marks.pop_front();
             }
         }
-        self.spans.drop_to(self.taken);
     }
 
     /// Copies the front beats out and takes them.

@@ -5,11 +5,11 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod fast;
 pub(crate) mod packing;
 pub(crate) mod ring;
 pub(crate) mod scene;
 pub(crate) mod sg;
-pub(crate) mod shortcuts;
 
 use std::time::Duration;
 

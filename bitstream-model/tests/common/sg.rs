@@ -84,6 +84,8 @@ pub(crate) struct Machine {
     pub(crate) host: Host,
     pub(crate) mm2s: Vec<Ring>,
     pub(crate) s2mm: Vec<Ring>,
+    /// The longest wait for an interrupt.
+    slice: Duration,
 }
 
 impl Machine {
@@ -97,9 +99,14 @@ impl Machine {
             (0..host.cores()).map(|core| Ring::new(&host, core, direction, slots)).collect()
         };
         let (mm2s, s2mm) = (rings(Direction::Mm2s), rings(Direction::S2mm));
-        let mut machine = Self { host, mm2s, s2mm };
+        let mut machine = Self { host, mm2s, s2mm, slice: microseconds(5_000) };
         machine.recover();
         machine
+    }
+
+    /// Waits no longer than that for an interrupt.
+    pub(crate) fn looks_every(&mut self, slice: Duration) {
+        self.slice = slice;
     }
 
     /// Resets everything and starts the rings from their first slot.
@@ -184,8 +191,8 @@ impl Machine {
             if left.is_zero() {
                 return Err(Failure::Deadline);
             }
-            // Bounded, so that a lost interrupt does not matter.
-            let _ = host.port.wait_interrupt(left.min(microseconds(50)));
+            // Bounded, so that a lost interrupt does not matter, and longer than most steps.
+            let _ = host.port.wait_interrupt(left.min(self.slice));
             for core in 0..host.cores() {
                 for direction in BOTH {
                     let value = host.status(core, direction);
@@ -257,12 +264,7 @@ impl Machine {
 
     /// Runs a step until its results are in memory. The board alone computes.
     pub(crate) fn drive(&mut self, step: &Step, lanes: &[Lane]) -> Result<Flight, Failure> {
-        step.write_arguments(&self.host);
-        let mut flight = Flight::default();
-        let beats = beats_out(&self.host.variant(), step);
-        self.arm(&mut flight, &beats);
-        self.start();
-        self.send(&mut flight, lanes);
+        let flight = self.begin(step, lanes);
         // The widest window is 65,534 cycles, 0.24 ms.
         let stalls = u32::try_from(step.collisions.len()).expect("some thousands");
         self.wait(&flight, LONG + microseconds(300) * stalls)?;
@@ -270,6 +272,17 @@ impl Machine {
             true => Ok(flight),
             false => Err(Failure::NotDone),
         }
+    }
+
+    /// Begins a step with the streams `lanes`.
+    pub(crate) fn begin(&mut self, step: &Step, lanes: &[Lane]) -> Flight {
+        step.write_arguments(&self.host);
+        let mut flight = Flight::default();
+        let beats = beats_out(&self.host.variant(), step);
+        self.arm(&mut flight, &beats);
+        self.start();
+        self.send(&mut flight, lanes);
+        flight
     }
 
     /// Whether the accelerator sets `ap_done`, which may come some hundred cycles after the results.

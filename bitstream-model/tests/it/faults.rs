@@ -157,6 +157,7 @@ fn slow_ports_and_late_words_cost_time_and_change_nothing() {
 fn an_interrupt_is_lost_or_late_and_the_descriptors_still_complete() {
     for text in ["irq-drop", "irq-delay=300000"] {
         let mut machine = machine();
+        machine.looks_every(common::microseconds(50));
         machine.host.board.inject(plan(text));
         machine.step(&scene()).expect("the descriptors are complete");
         assert_eq!(machine.host.board.faults(), 1, "{text}");

@@ -7,9 +7,9 @@ use bitstream_model::BoardConfig;
 use pgs_interface::profile::{PROFILES, Profile};
 use pgs_support::float_env::foreign::{Environment, environments, under};
 
+use crate::common::fast::{Visible, scene, visible};
 use crate::common::scene::{AT_REST, Body, Step};
 use crate::common::sg::Machine;
-use crate::common::shortcuts::{Visible, scene, visible};
 
 fn boards() -> impl Iterator<Item = BoardConfig> {
     let of = |profile: &'static Profile, inertia| BoardConfig {

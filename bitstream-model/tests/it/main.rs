@@ -7,6 +7,7 @@ mod common;
 
 mod accelerator;
 mod direct;
+mod fast;
 mod faults;
 mod fence;
 mod float_environment;
@@ -17,6 +18,3 @@ mod quirks;
 mod recording;
 mod registers;
 mod scatter_gather;
-mod shortcuts;
-mod shortcuts_buffers;
-mod shortcuts_warm;

@@ -63,6 +63,16 @@ impl Array {
         }
     }
 
+    /// Calls `with` for each beat of a record that fills whole beats.
+    #[inline]
+    pub(crate) fn each_beat(&self, rows: &[Row], mut with: impl FnMut(Beat)) {
+        if self.rows_per_beat == 1 {
+            rows.iter().for_each(|row| with(Beat(*row)));
+        } else {
+            rows.chunks_exact(2).for_each(|pair| with(beat_of(pair[0], pair[1])));
+        }
+    }
+
     /// Clock cycles that the streams take for the first `records` records.
     pub(crate) fn cycles(&self, records: usize) -> u64 {
         self.striping.cycles(self.beats_of(records))
@@ -77,7 +87,7 @@ pub(crate) fn half_of(Beat(words): Beat, half: usize) -> Row {
 }
 
 /// The beat of two rows of sixteen-bit words.
-pub(crate) fn beat_of(first: Row, second: Row) -> Beat {
+fn beat_of(first: Row, second: Row) -> Beat {
     let half = |[a, b, c, d]: Row| [a | (b << 16), c | (d << 16)];
     let ([a, b], [c, d]) = (half(first), half(second));
     Beat([a, b, c, d])

@@ -84,6 +84,11 @@ impl Collision {
         }
     }
 
+    /// Its contact points and bodies.
+    pub(crate) fn head(&self) -> (usize, [u32; 2]) {
+        (self.count, [self.body_a, self.body_b])
+    }
+
     /// The collision with the impulses of a row that a warm pass brings.
     #[inline(always)]
     pub(crate) fn with_impulses(self, format: StreamFormat, impulses: Row) -> Self {

@@ -1,6 +1,6 @@
 //! Sends the results: rows into beats, beats onto streams, padding, TLAST.
 
-use super::array::{Array, Row, beat_of};
+use super::array::{Array, Row};
 use super::striping::{PerStream, STREAMS_MAX};
 use crate::stream::Stream;
 use pgs_interface::record::{Beat, result};
@@ -24,6 +24,11 @@ impl Results {
         Self { array, done: 0, beats: 0, sent: [0; STREAMS_MAX] }
     }
 
+    /// How they lie.
+    pub(crate) fn array(&self) -> &Array {
+        &self.array
+    }
+
     /// Clock cycles that the streams take for the records sent so far.
     pub(crate) fn cycles(&self) -> u64 {
         self.array.cycles(self.done)
@@ -37,47 +42,13 @@ impl Results {
 
     /// Sends a record, for which there must be room; returns the sum of its words.
     pub(crate) fn send(&mut self, rows: &[Row], streams: &mut [Stream]) -> u32 {
-        let mut sum = 0_u32;
-        if self.array.rows_per_beat == 1 {
-            for row in rows {
-                sum = sum.wrapping_add(self.push(Beat(*row), streams));
-            }
-        } else {
-            for pair in rows.chunks_exact(2) {
-                sum = sum.wrapping_add(self.push(beat_of(pair[0], pair[1]), streams));
-            }
-        }
+        let (mut sum, array) = (0_u32, self.array);
+        array.each_beat(rows, |beat| sum = sum.wrapping_add(self.push(beat, streams)));
         self.done += 1;
         while self.done == self.array.records && self.beats < self.array.beats {
             self.push(Beat::default(), streams);
         }
         sum
-    }
-
-    /// Sends `records` records, for which there must be room; `rows` holds their beats on each
-    /// stream.
-    pub(crate) fn send_rows(
-        &mut self,
-        records: usize,
-        rows: &[Vec<Beat>; STREAMS_MAX],
-        streams: &mut [Stream],
-    ) {
-        for (k, (stream, rows)) in streams.iter_mut().zip(rows).enumerate() {
-            stream.push(rows);
-            self.sent[k] += rows.len();
-            if self.sent[k] == self.array.packets[k] && !rows.is_empty() {
-                stream.mark_last();
-            }
-        }
-        self.done += records;
-        self.beats += records * result::ROWS;
-    }
-
-    /// Counts `records` records as sent without sending them; the last record is not among them.
-    pub(crate) fn pass(&mut self, records: usize) {
-        self.done += records;
-        self.beats += records * self.array.rows / self.array.rows_per_beat;
-        self.sent = self.array.striping.counts(self.beats);
     }
 
     fn push(&mut self, beat: Beat, streams: &mut [Stream]) -> u32 {

@@ -4,7 +4,6 @@
 use super::array::{Array, Row, half_of};
 use super::striping::{PerStream, Places, STREAMS_MAX};
 use crate::cast::register;
-use crate::memory::Memory;
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::record::{Beat, LANES};
@@ -103,14 +102,18 @@ impl Segment {
     /// A reader of records that have arrived: it skips `ahead` records and reads the rest one
     /// after the other. At least one must have arrived behind the skipped ones. All records stay
     /// in the streams until [`advance`](Self::advance).
-    pub(crate) fn reader<'a>(&'a self, ahead: usize, streams: &'a [Stream]) -> Reader<'a> {
-        let first = (self.done + ahead) * self.array.rows;
-        let places = self.array.striping.places(first / self.array.rows_per_beat);
-        let mut reader = Reader { segment: self, streams, places, left: None };
-        if !first.is_multiple_of(self.array.rows_per_beat) {
-            reader.left = Some(half_of(reader.beat(), 1));
-        }
-        reader
+    pub(crate) fn reader<'a>(
+        &'a self,
+        ahead: usize,
+        streams: &'a [Stream],
+    ) -> Reader<'a, Arrived<'a>> {
+        let arrived = Arrived { taken: &self.taken, streams };
+        Reader::new(&self.array, self.done + ahead, arrived)
+    }
+
+    /// How its records lie.
+    pub(crate) fn array(&self) -> &Array {
+        &self.array
     }
 
     /// Takes the next `records` records, which have been read, out of the streams. Returns the sum
@@ -126,60 +129,70 @@ impl Segment {
         sum
     }
 
-    /// Beats of the next `records` records on each stream.
-    pub(crate) fn beats_of_next(&self, records: usize) -> PerStream {
-        let mut beats = self.array.striping.counts(self.array.beats_of(self.done + records));
-        for (beats, taken) in beats.iter_mut().zip(self.taken) {
-            *beats -= taken;
-        }
-        beats
-    }
-
-    /// Drops the next `records` records from the streams; the caller has read them in place.
-    pub(crate) fn skip(&mut self, records: usize, streams: &mut [Stream]) {
-        self.done += records;
-        let after = self.array.striping.counts(self.array.beats_of(self.done));
-        for (k, stream) in streams.iter_mut().enumerate() {
-            stream.pop(after[k] - self.taken[k]);
-        }
-        self.taken = after;
-    }
-
-    /// Copies the next `records` records, which have arrived, from memory into the streams.
-    pub(crate) fn fetch(&self, records: usize, streams: &mut [Stream], memory: &Memory) {
-        for (stream, beats) in streams.iter_mut().zip(self.beats_of_next(records)) {
-            if stream.refers() {
-                stream.fetch(beats, memory);
-            }
-        }
-    }
-
     pub(crate) fn finished(&self) -> bool {
         self.done == self.array.records
     }
 }
 
+/// Beats of an array, by their stream and their number on it.
+pub(crate) trait Beats {
+    fn beat(&self, stream: usize, number: usize) -> Beat;
+}
+
+/// Beats that have arrived on the streams.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Arrived<'a> {
+    taken: &'a PerStream,
+    streams: &'a [Stream],
+}
+
+impl Beats for Arrived<'_> {
+    #[inline(always)]
+    fn beat(&self, stream: usize, number: usize) -> Beat {
+        self.streams[stream].peek(number - self.taken[stream])
+    }
+}
+
+/// All beats of an array, stream by stream.
+impl Beats for [&[Beat]; STREAMS_MAX] {
+    #[inline(always)]
+    fn beat(&self, stream: usize, number: usize) -> Beat {
+        self[stream][number]
+    }
+}
+
 /// Reads one record after the other.
 #[derive(Debug)]
-pub(crate) struct Reader<'a> {
-    segment: &'a Segment,
-    streams: &'a [Stream],
+pub(crate) struct Reader<'a, B> {
+    array: &'a Array,
+    beats: B,
     places: Places<'a>,
     /// The second row of a beat whose first row has been read.
     left: Option<Row>,
 }
 
-impl Reader<'_> {
+impl<'a, B: Beats> Reader<'a, B> {
+    /// Reads from record `first` on, which is there.
+    pub(crate) fn new(array: &'a Array, first: usize, beats: B) -> Self {
+        let row = first * array.rows;
+        let places = array.striping.places(row / array.rows_per_beat);
+        let mut reader = Self { array, beats, places, left: None };
+        if !row.is_multiple_of(array.rows_per_beat) {
+            reader.left = Some(half_of(reader.beat(), 1));
+        }
+        reader
+    }
+
     #[inline(always)]
     fn beat(&mut self) -> Beat {
         let (stream, number) = self.places.take();
-        self.streams[stream].peek(number - self.segment.taken[stream])
+        self.beats.beat(stream, number)
     }
 
     /// The rows of the next record.
     #[inline]
     pub(crate) fn record<const ROWS: usize>(&mut self) -> [Row; ROWS] {
-        debug_assert!(ROWS <= self.segment.array.rows, "the caller knows the record");
+        debug_assert!(ROWS <= self.array.rows, "the caller knows the record");
         self.rows()
     }
 
@@ -187,7 +200,7 @@ impl Reader<'_> {
     #[inline]
     pub(crate) fn rows<const ROWS: usize>(&mut self) -> [Row; ROWS] {
         let mut rows = [[0; LANES]; ROWS];
-        if self.segment.array.rows_per_beat == 1 {
+        if self.array.rows_per_beat == 1 {
             for row in &mut rows {
                 *row = self.beat().0;
             }

@@ -2,7 +2,6 @@
 //! and the cycles that they take.
 
 use pgs_interface::address_map::DMA_COUNT_MAX;
-use pgs_interface::record::{pose, result, velocity};
 use pgs_interface::stripe::Stripe;
 
 use crate::config::{GROUP_MAX, beat_cycles};
@@ -11,53 +10,6 @@ use crate::config::{GROUP_MAX, beat_cycles};
 pub(crate) const STREAMS_MAX: usize = DMA_COUNT_MAX;
 /// A count for each stream.
 pub(crate) type PerStream = [usize; STREAMS_MAX];
-
-/// Rows of a body's velocity record, and of its pose record.
-pub(crate) const ROWS_IN: usize = 2;
-/// Rows of a result.
-pub(crate) const ROWS_OUT: usize = 4;
-const _: () = assert!(velocity::ROWS == ROWS_IN && pose::ROWS == ROWS_IN);
-const _: () = assert!(result::ROWS == ROWS_OUT);
-
-/// Streams that take turns, a beat each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Turns {
-    pub(crate) streams: usize,
-}
-
-impl Turns {
-    /// The turns of a stripe that gives each stream one beat after the other; `None` for any other
-    /// stripe.
-    pub(crate) fn of(stripe: &Stripe, streams: usize) -> Option<Self> {
-        let all = stripe.streams.iter().map(|stream| usize::from(*stream)).eq(0..streams);
-        (all && !stripe.padded).then_some(Self { streams })
-    }
-
-    /// The stream of a beat, and its number there.
-    #[inline(always)]
-    pub(crate) const fn place(self, beat: usize) -> (usize, usize) {
-        (beat % self.streams, beat / self.streams)
-    }
-
-    /// How many of the first `beats` beats are on each stream.
-    #[inline(always)]
-    pub(crate) fn counts(self, beats: usize) -> PerStream {
-        let streams = self.streams;
-        std::array::from_fn(|k| if k < streams { (beats + streams - 1 - k) / streams } else { 0 })
-    }
-
-    /// Beats from the first one on without a gap, where stream `k` has `on_stream(k)` beats.
-    #[inline]
-    pub(crate) fn contiguous(self, on_stream: impl Fn(usize) -> usize) -> usize {
-        let missing = |k: usize| on_stream(k) * self.streams + k;
-        (0..self.streams).map(missing).min().unwrap_or(0)
-    }
-
-    /// Clock cycles that the first `beats` beats take, one on each stream.
-    pub(crate) fn cycles(self, beats: usize) -> u64 {
-        beats.div_ceil(self.streams) as u64
-    }
-}
 
 /// A stripe over streams of known widths.
 #[derive(Debug, Clone, Copy)]
@@ -104,6 +56,11 @@ impl Striping {
     /// Beats with the padding of the last group, for an array of `beats` beats.
     pub(crate) fn padded(&self, beats: usize) -> usize {
         if self.padded { beats.next_multiple_of(self.group) } else { beats }
+    }
+
+    /// Beats of a group.
+    pub(crate) fn group(&self) -> usize {
+        self.group
     }
 
     /// Walks over the beats from `beat` on: the stream of each, and its number on it.
@@ -224,27 +181,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn streams_that_take_turns_lie_as_their_stripes_say() {
-        let three = Stripe { streams: &[0, 1, 2], padded: false };
-        for (stripe, widths) in [(three, &[128; 3][..]), (FLOAT.stripes.poses, FLOAT.mm2s_widths)] {
-            let turns = Turns::of(&stripe, widths.len()).expect("they take turns");
-            let striping = Striping::new(&stripe, widths);
-            let mut places = striping.places(0);
-            for beats in 0..40 {
-                assert_eq!(turns.counts(beats), striping.counts(beats), "{beats}");
-                assert_eq!(turns.cycles(beats), striping.cycles(beats), "{beats}");
-                assert_eq!(turns.place(beats), places.take(), "{beats}");
-                let there = turns.counts(beats);
-                assert_eq!(turns.contiguous(|k| there[k]), beats);
-                let more = |k: usize| there[k] + k * beats % 3;
-                assert_eq!(turns.contiguous(more), striping.contiguous(more), "{beats}");
-            }
-        }
-        let not = [&FLOAT.stripes.collisions, &HALF.stripes.velocities];
-        assert!(not.into_iter().all(|stripe| Turns::of(stripe, 3).is_none()));
     }
 
     #[test]

@@ -1,11 +1,14 @@
-//! Reads and writes the registers of the floating-point environment: the one module with their instructions.
+//! Reads and writes the registers of the floating-point environment: the one module with their
+//! instructions.
 //!
 //! # Safety
 //!
 //! Two invariants make every write sound. A written value was read from the registers before, or is
-//! [`Registers::STANDARD`], or was given to [`foreign::under`](super::foreign::under), whose caller answers
-//! for it: no reserved bit is set. And Rust's own requirement, that its code runs in the standard
-//! environment, is established by a write, or given up to code that was in another one already.
+//! [`Registers::STANDARD`], or was given to [`foreign::under`](super::foreign::under), whose caller
+//! answers for it, or differs from one of them in flags, and on aarch64 in FZ: no reserved bit is
+//! set. And Rust's own requirement, that its code runs in the standard environment, is established
+//! by a write, or given up to code that was in another one already. With FZ set it holds as long as
+//! no flag says that a number was flushed, and where one does, the results are dropped.
 
 pub(super) use arch::Registers;
 
@@ -48,6 +51,8 @@ mod arch {
         pub(in crate::float_env) const STANDARD: Self = Self(0x1F80);
         /// The exception flags.
         const FLAGS: u32 = 0x3F;
+        /// Of them denormal and underflow.
+        const SUBNORMAL: u32 = 0x12;
         /// Of callers.
         #[cfg(any(test, feature = "foreign-environment"))]
         pub(in crate::float_env) const FOREIGN: &[(&str, Self)] = &[
@@ -69,6 +74,16 @@ mod arch {
             Self(mxcsr)
         }
 
+        /// The same, with the flags down that a subnormal number raises.
+        pub(in crate::float_env) const fn watching(self) -> Self {
+            Self(self.0 & !Self::SUBNORMAL)
+        }
+
+        /// Whether all of these flags are still down.
+        pub(in crate::float_env) const fn saw_no_subnormal(self) -> bool {
+            self.0 & Self::SUBNORMAL == 0
+        }
+
         /// The bits that decide results and traps.
         #[inline]
         pub(in crate::float_env) const fn control(self) -> u32 {
@@ -87,8 +102,8 @@ mod arch {
         #[inline]
         pub(super) fn write(self) {
             let mxcsr = self.0;
-            // SAFETY: `ldmxcsr` loads the four bytes of `mxcsr`; no reserved bit is set in it, and whose
-            // environment it is, the module's head says. Flags that are loaded do not trap.
+            // SAFETY: `ldmxcsr` loads the four bytes of `mxcsr`; no reserved bit is set in it, and
+            // whose environment it is, the module's head says. Flags that are loaded do not trap.
             unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const mxcsr, options(nostack)) };
         }
     }
@@ -106,8 +121,8 @@ mod arch {
     }
 
     impl Registers {
-        /// No alternative half precision, no default NaN, no flush to zero in any width, round to nearest,
-        /// no trap.
+        /// No alternative half precision, no default NaN, no flush to zero in any width, round to
+        /// nearest, no trap.
         pub(in crate::float_env) const STANDARD: Self = Self::of(0, 0);
         /// Of callers.
         #[cfg(any(test, feature = "foreign-environment"))]
@@ -118,6 +133,9 @@ mod arch {
             ("toward zero", Self::of(0b11 << 22, 0x9F)),
             ("default NaN", Self::of(1 << 25, 0)),
         ];
+
+        /// The flags UFC and IDC of FPSR.
+        const SUBNORMAL: u64 = 0x88;
 
         const fn of(control: u64, status: u64) -> Self {
             Self { control, status }
@@ -134,6 +152,16 @@ mod arch {
             Self { control, status }
         }
 
+        /// The same with FZ set, and with the flags down that a flushed number raises: UFC and IDC.
+        pub(in crate::float_env) const fn watching(self) -> Self {
+            Self::of(self.control | 1 << 24, self.status & !Self::SUBNORMAL)
+        }
+
+        /// Whether all of these flags are still down.
+        pub(in crate::float_env) const fn saw_no_subnormal(self) -> bool {
+            self.status & Self::SUBNORMAL == 0
+        }
+
         /// The bits that decide results and traps.
         #[inline]
         pub(in crate::float_env) const fn control(self) -> u64 {
@@ -148,8 +176,8 @@ mod arch {
             }
             if self.status != now.status {
                 let status = self.status;
-                // SAFETY: FPSR holds flags alone, which change no result and do not trap; these were read
-                // from it.
+                // SAFETY: FPSR holds flags alone, which change no result and do not trap; these
+                // were read from it.
                 unsafe { asm!("msr fpsr, {}", in(reg) status, options(nostack)) };
             }
         }
@@ -158,7 +186,8 @@ mod arch {
         #[inline]
         pub(super) fn write(self) {
             let control = self.control;
-            // SAFETY: no reserved bit is set in it, and whose environment it is, the module's head says.
+            // SAFETY: no reserved bit is set in it, and whose environment it is, the module's head
+            // says.
             unsafe { asm!("msr fpcr, {}", in(reg) control, options(nostack)) };
         }
     }
@@ -177,6 +206,14 @@ mod arch {
 
         pub(in crate::float_env) fn read() -> Self {
             Self
+        }
+
+        pub(in crate::float_env) const fn watching(self) -> Self {
+            Self
+        }
+
+        pub(in crate::float_env) const fn saw_no_subnormal(self) -> bool {
+            false
         }
 
         pub(in crate::float_env) const fn control(self) {}

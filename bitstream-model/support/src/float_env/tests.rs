@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any};
 
 use super::foreign::{Environment, environments, under};
-use super::{standard, standard_around};
+use super::{standard, standard_around, without_subnormals};
 use crate::Crew;
 
 /// Bits that every environment of a caller changes or does not survive.
@@ -126,4 +126,36 @@ fn all_compute_alike(crew: &mut Crew, name: &str) {
     }
     crew.run(&|_| assert_eq!(computed(), EXPECTED, "{name}"));
     assert_eq!(Environment::current(), outside, "{name}");
+}
+
+#[test]
+fn subnormal_operands_and_inexact_results_are_seen_and_nothing_else_is() {
+    if environments().next().is_none() {
+        // Nothing is certain there.
+        assert!(!without_subnormals(true, || ()).1);
+        return;
+    }
+    let tiny = black_box(f32::MIN_POSITIVE);
+    let seen = |a: f32, b: f32| !without_subnormals(true, || black_box(black_box(a) * b)).1;
+    standard(|| {
+        for (a, b, subnormal) in [
+            (1.0, 3.0, false),
+            (0.0, -3.0, false),
+            (f32::INFINITY, 0.0, false),
+            (tiny, 2.0, false),
+            (tiny, 1.0 / 3.0, true),
+            (-tiny / 2.0, 8.0, true),
+            (f32::from_bits(1), 1.0, true),
+        ] {
+            // Twice: the flags of the first time are down again.
+            assert_eq!([seen(a, b), seen(a, b)], [subnormal; 2], "{a:e} {b:e}");
+            assert!(!seen(1.5, 3.0));
+        }
+        // An exact one is seen where it is used.
+        let used = without_subnormals(true, || black_box(black_box(tiny * black_box(0.5)) + 1.0));
+        assert!(!used.1);
+        let (_, none) = without_subnormals(false, || black_box(f32::from_bits(1)) * black_box(0.7));
+        assert!(none, "nobody watches");
+        assert_eq!(computed(), EXPECTED, "the environment is the standard one again");
+    });
 }

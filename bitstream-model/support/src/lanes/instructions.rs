@@ -1,12 +1,13 @@
-//! The SIMD instructions that a processor may have: compiles work for each set, turns quads into
-//! columns, and rounds to binary16. For the latter two the compiler finds no good instructions by
-//! itself.
+//! The operations on lanes, and the choice of the instructions that a processor has for them.
 
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::*;
+#![allow(
+    clippy::should_implement_trait,
+    reason = "the operators of `F32s` are made of these functions of registers"
+)]
+
 use std::fmt::Debug;
 
-use super::{F32x16, LANES, halves};
+use super::{LANES, each};
 
 /// Four numbers in memory.
 pub type Quad = [f32; 4];
@@ -20,168 +21,214 @@ pub trait Work {
     fn run(self, instructions: impl Instructions) -> Self::Output;
 }
 
-/// Proof that the processor has a set of instructions.
+/// Proof that the processor has a set of instructions, and the operations by them.
 pub trait Instructions: Copy + Debug {
-    /// The numbers of one quad for each lane, by their place in the quad.
-    fn columns(self, quads: [Quad; LANES]) -> [F32x16; 4];
+    /// A number in each lane.
+    type Register: Copy;
 
-    /// One quad for each lane, from the numbers by their place in it.
-    fn quads(self, columns: [F32x16; 4]) -> [Quad; LANES];
+    /// The numbers of an array.
+    fn load(self, numbers: &[f32; LANES]) -> Self::Register;
 
-    /// The binary16 number nearest to each number, as the f32 of the same value.
-    ///
-    /// A tie goes to the even number. A magnitude of half a step or more beyond 65504 becomes
-    /// infinite. Subnormal numbers of binary16 are kept, and zeros keep their sign. Every NaN
-    /// becomes [`f32::NAN`]: sign and payload are lost.
-    fn round_to_halves(self, numbers: F32x16) -> F32x16;
+    /// The array of the numbers.
+    fn store(self, numbers: Self::Register) -> [f32; LANES];
 
-    /// The columns of quads that lie `stride` quads apart.
-    ///
-    /// # Panics
-    ///
-    /// If `quads` does not reach to the last lane's.
+    /// The same number in each lane.
     #[inline(always)]
-    fn load(self, quads: &[Quad], stride: usize) -> [F32x16; 4] {
-        assert!(quads.len() > (LANES - 1) * stride, "a quad for each lane");
-        self.columns(super::each(|lane| quads[lane * stride]))
+    fn splat(self, number: f32) -> Self::Register {
+        self.load(&[number; LANES])
     }
 
-    /// Stores columns as quads that lie `stride` quads apart.
-    ///
-    /// # Panics
-    ///
-    /// If `quads` does not reach to the last lane's.
+    /// A function of the numbers of each lane.
     #[inline(always)]
-    fn store(self, columns: [F32x16; 4], quads: &mut [Quad], stride: usize) {
-        assert!(quads.len() > (LANES - 1) * stride, "a quad for each lane");
-        for (lane, quad) in self.quads(columns).into_iter().enumerate() {
-            quads[lane * stride] = quad;
+    fn zip(
+        self,
+        a: Self::Register,
+        b: Self::Register,
+        function: impl Fn(f32, f32) -> f32,
+    ) -> Self::Register {
+        let (a, b) = (self.store(a), self.store(b));
+        self.load(&each(|lane| function(a[lane], b[lane])))
+    }
+
+    /// One bit for each lane whose numbers satisfy a condition.
+    #[inline(always)]
+    fn test(
+        self,
+        a: Self::Register,
+        b: Self::Register,
+        condition: impl Fn(f32, f32) -> bool,
+    ) -> u32 {
+        let (a, b) = (self.store(a), self.store(b));
+        let bits = each(|lane| u32::from(condition(a[lane], b[lane])) << lane);
+        bits.into_iter().fold(0, |all, bit| all | bit)
+    }
+
+    /// `a + b`.
+    #[inline(always)]
+    fn add(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| a + b)
+    }
+
+    /// `a - b`.
+    #[inline(always)]
+    fn sub(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| a - b)
+    }
+
+    /// `a * b`.
+    #[inline(always)]
+    fn mul(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| a * b)
+    }
+
+    /// `a / b`.
+    #[inline(always)]
+    fn div(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| a / b)
+    }
+
+    /// `if a > b { a } else { b }`.
+    #[inline(always)]
+    fn larger(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    /// `if a < b { a } else { b }`.
+    #[inline(always)]
+    fn smaller(self, a: Self::Register, b: Self::Register) -> Self::Register {
+        self.zip(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    /// The square root.
+    #[inline(always)]
+    fn sqrt(self, a: Self::Register) -> Self::Register {
+        self.zip(a, a, |a, _| a.sqrt())
+    }
+
+    /// `-a`.
+    #[inline(always)]
+    fn neg(self, a: Self::Register) -> Self::Register {
+        self.zip(a, a, |a, _| -a)
+    }
+
+    /// The absolute value.
+    #[inline(always)]
+    fn abs(self, a: Self::Register) -> Self::Register {
+        self.zip(a, a, |a, _| a.abs())
+    }
+
+    /// One bit per lane: `a > b`.
+    #[inline(always)]
+    fn above(self, a: Self::Register, b: Self::Register) -> u32 {
+        self.test(a, b, |a, b| a > b)
+    }
+
+    /// One bit per lane: `a == b`.
+    #[inline(always)]
+    #[expect(clippy::float_cmp, reason = "equality is what is asked for")]
+    fn is(self, a: Self::Register, b: Self::Register) -> u32 {
+        self.test(a, b, |a, b| a == b)
+    }
+
+    /// `a` in the lanes whose bits are set, and `b` elsewhere.
+    #[inline(always)]
+    fn select(self, bits: u32, a: Self::Register, b: Self::Register) -> Self::Register {
+        let (a, b) = (self.store(a), self.store(b));
+        self.load(&each(|lane| if bits >> lane & 1 != 0 { a[lane] } else { b[lane] }))
+    }
+
+    /// Exchanges rows and columns of each four lanes.
+    #[inline(always)]
+    fn transposed(self, rows: [Self::Register; 4]) -> [Self::Register; 4] {
+        let rows = rows.map(|row| self.store(row));
+        let column = |column: usize| each(|lane| rows[lane % 4][lane - lane % 4 + column]);
+        [0, 1, 2, 3].map(|place| self.load(&column(place)))
+    }
+
+    /// Some quads one behind the other.
+    #[inline(always)]
+    fn of_quads(self, quads: [Quad; LANES / 4]) -> Self::Register {
+        self.load(&bytemuck::cast(quads))
+    }
+
+    /// The numbers of one quad for each lane, by their places in it.
+    #[inline(always)]
+    fn columns(self, quad: impl Fn(usize) -> Quad) -> [Self::Register; 4] {
+        let mut rows = [self.splat(0.0); 4];
+        for (at, row) in rows.iter_mut().enumerate() {
+            let mut quads = [Quad::default(); LANES / 4];
+            for (part, to) in quads.iter_mut().enumerate() {
+                *to = quad(4 * part + at);
+            }
+            *row = self.of_quads(quads);
+        }
+        self.transposed(rows)
+    }
+
+    /// Reads a row of two quads for each lane, by their places in it.
+    ///
+    /// # Safety
+    ///
+    /// The rows that the indices name exist from `rows` on, and no other thread writes them during
+    /// the call.
+    #[inline(always)]
+    unsafe fn gather(self, rows: *const [Quad; 2], indices: &[u32; LANES]) -> [Self::Register; 8] {
+        let row = |lane: usize| {
+            // SAFETY: the caller promises that the row exists.
+            let row = unsafe { rows.add(indices[lane] as usize) };
+            // SAFETY: the row exists, and by the caller no other thread writes it.
+            unsafe { *row }
+        };
+        let ([a, b, c, d], [e, f, g, h]) =
+            (self.columns(|lane| row(lane)[0]), self.columns(|lane| row(lane)[1]));
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Writes a row of two quads for each lane, lane after lane.
+    ///
+    /// # Safety
+    ///
+    /// The rows that the indices name exist from `rows` on, and no other thread accesses them
+    /// during the call.
+    #[inline(always)]
+    unsafe fn scatter(
+        self,
+        [a, b, c, d, e, f, g, h]: [Self::Register; 8],
+        rows: *mut [Quad; 2],
+        indices: &[u32; LANES],
+    ) {
+        let quads = |columns| self.transposed(columns).map(|row| self.store(row));
+        let (first, second) = (quads([a, b, c, d]), quads([e, f, g, h]));
+        for (lane, index) in indices.iter().enumerate() {
+            let quad = |rows: &[[f32; LANES]; 4]| -> Quad {
+                let part = lane - lane % 4;
+                [0, 1, 2, 3].map(|place| rows[lane % 4][part + place])
+            };
+            // SAFETY: the caller promises that the row exists.
+            let row = unsafe { rows.add(*index as usize) };
+            // SAFETY: the row exists, and by the caller no other thread accesses it.
+            unsafe { *row = [quad(&first), quad(&second)] };
         }
     }
 }
 
-/// The instructions that every processor of the target has.
+/// The instructions that every processor of the target has, as the compiler finds them.
+#[cfg_attr(target_arch = "aarch64", allow(dead_code, reason = "all of them have NEON"))]
 #[derive(Debug, Clone, Copy)]
 struct Target;
 
 impl Instructions for Target {
+    type Register = [f32; LANES];
+
     #[inline(always)]
-    fn columns(self, quads: [Quad; LANES]) -> [F32x16; 4] {
-        [0, 1, 2, 3].map(|place| F32x16::from_fn(|lane| quads[lane][place]))
+    fn load(self, numbers: &[f32; LANES]) -> [f32; LANES] {
+        *numbers
     }
 
     #[inline(always)]
-    fn quads(self, columns: [F32x16; 4]) -> [Quad; LANES] {
-        let [a, b, c, d] = columns.map(F32x16::to_array);
-        super::each(|lane| [a[lane], b[lane], c[lane], d[lane]])
+    fn store(self, numbers: [f32; LANES]) -> [f32; LANES] {
+        numbers
     }
-
-    #[inline(always)]
-    fn round_to_halves(self, numbers: F32x16) -> F32x16 {
-        numbers.map(halves::nearest)
-    }
-}
-
-/// Defines a set of x86-64 instructions; `$parts` of its registers hold all lanes.
-#[cfg(target_arch = "x86_64")]
-macro_rules! instructions {
-    (
-        $(#[$meta:meta])*
-        $name:ident: [$register:ident; $parts:literal], $features:literal,
-        $low:ident $high:ident $shuffle:ident $narrow:ident $widen:ident
-    ) => {
-        $(#[$meta])*
-        #[derive(Debug, Clone, Copy)]
-        struct $name(());
-
-        impl $name {
-            #[target_feature(enable = $features)]
-            fn enabled<W: Work>(self, work: W) -> W::Output {
-                work.run(self)
-            }
-
-            /// Exchanges rows and columns of each four lanes.
-            #[inline]
-            #[target_feature(enable = $features)]
-            fn transposed_part([a, b, c, d]: [$register; 4]) -> [$register; 4] {
-                let (low_ab, high_ab) = ($low(a, b), $high(a, b));
-                let (low_cd, high_cd) = ($low(c, d), $high(c, d));
-                [
-                    $shuffle::<0x44>(low_ab, low_cd),
-                    $shuffle::<0xEE>(low_ab, low_cd),
-                    $shuffle::<0x44>(high_ab, high_cd),
-                    $shuffle::<0xEE>(high_ab, high_cd),
-                ]
-            }
-
-            /// Rounds to binary16 and back. A NaN keeps its sign and the head of its payload.
-            #[inline]
-            #[target_feature(enable = $features)]
-            fn rounded_part(numbers: $register) -> $register {
-                $widen($narrow::<_MM_FROUND_TO_NEAREST_INT>(numbers))
-            }
-
-            #[inline(always)]
-            fn transposed(self, rows: [F32x16; 4]) -> [F32x16; 4] {
-                let [a, b, c, d]: [[$register; $parts]; 4] = bytemuck::cast(rows.map(|row| row.0));
-                let mut columns = [a, b, c, d];
-                for part in 0..$parts {
-                    let rows = [a[part], b[part], c[part], d[part]];
-                    // SAFETY: a value of this type is made where the processor has the features.
-                    let transposed = unsafe { Self::transposed_part(rows) };
-                    for (column, transposed) in columns.iter_mut().zip(transposed) {
-                        column[part] = transposed;
-                    }
-                }
-                columns.map(|column| F32x16(bytemuck::cast(column)))
-            }
-        }
-
-        impl Instructions for $name {
-            #[inline(always)]
-            fn columns(self, quads: [Quad; LANES]) -> [F32x16; 4] {
-                let row = |at: usize| {
-                    let row = [quads[at], quads[4 + at], quads[8 + at], quads[12 + at]];
-                    F32x16(bytemuck::cast(row))
-                };
-                self.transposed([row(0), row(1), row(2), row(3)])
-            }
-
-            #[inline(always)]
-            fn quads(self, columns: [F32x16; 4]) -> [Quad; LANES] {
-                let rows = self.transposed(columns);
-                let rows: [[Quad; 4]; 4] = rows.map(|row| bytemuck::cast(row.0));
-                super::each(|lane| rows[lane % 4][lane / 4])
-            }
-
-            #[inline(always)]
-            fn round_to_halves(self, numbers: F32x16) -> F32x16 {
-                let mut parts: [$register; $parts] = bytemuck::cast(numbers.0);
-                for part in &mut parts {
-                    // SAFETY: a value of this type, such as `self`, is made in
-                    // `InstructionSet::all` alone, where the processor has the features.
-                    *part = unsafe { Self::rounded_part(*part) };
-                }
-                let rounded = F32x16(bytemuck::cast(parts));
-                rounded.or(numbers.is(numbers), F32x16::splat(f32::NAN))
-            }
-        }
-    };
-}
-
-#[cfg(target_arch = "x86_64")]
-instructions! {
-    /// AVX2 with F16C, which all processors with AVX2 have: a register holds eight lanes.
-    Avx2: [__m256; 2], "avx2,f16c",
-    _mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps _mm256_cvtps_ph _mm256_cvtph_ps
-}
-
-#[cfg(target_arch = "x86_64")]
-instructions! {
-    /// The part of AVX-512 that all its server and desktop processors have: a register holds all
-    /// lanes.
-    Avx512: [__m512; 1], "avx512f,avx512bw,avx512dq,avx512vl",
-    _mm512_unpacklo_ps _mm512_unpackhi_ps _mm512_shuffle_ps _mm512_cvtps_ph _mm512_cvtph_ps
 }
 
 /// A set of instructions that the processor has.
@@ -191,30 +238,27 @@ pub struct InstructionSet(Kind);
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Target(Target),
+    #[cfg(target_arch = "aarch64")]
+    Neon(super::aarch64::Neon),
     #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
+    Avx2(super::x86::Avx2),
     #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
+    Avx512(super::x86::Avx512),
 }
 
 impl InstructionSet {
     /// The sets that the processor has, the fastest first.
     pub fn all() -> impl Iterator<Item = Self> {
-        let target = Some(Kind::Target(Target));
         #[cfg(target_arch = "x86_64")]
-        let avx2 = (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("f16c"))
-            .then_some(Kind::Avx2(Avx2(())));
-        #[cfg(not(target_arch = "x86_64"))]
-        let avx2 = None;
-        #[cfg(target_arch = "x86_64")]
-        let avx512 = (is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl"))
-        .then_some(Kind::Avx512(Avx512(())));
-        #[cfg(not(target_arch = "x86_64"))]
-        let avx512 = None;
-        [avx512, avx2, target].into_iter().flatten().map(Self)
+        let wide = [
+            super::x86::Avx512::found().map(Kind::Avx512),
+            super::x86::Avx2::found().map(Kind::Avx2),
+        ];
+        #[cfg(target_arch = "aarch64")]
+        let wide = [Some(Kind::Neon(super::aarch64::Neon))];
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        let wide = [];
+        wide.into_iter().flatten().chain([Kind::Target(Target)]).map(Self)
     }
 
     /// The fastest that the processor has.
@@ -228,12 +272,12 @@ impl InstructionSet {
     pub fn run<W: Work>(self, work: W) -> W::Output {
         match self.0 {
             Kind::Target(target) => work.run(target),
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon(neon) => work.run(neon),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: a value is made in `all` alone, where the processor has the features.
-            Kind::Avx2(avx2) => unsafe { avx2.enabled(work) },
+            Kind::Avx2(avx2) => avx2.run(work),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: a value is made in `all` alone, where the processor has the features.
-            Kind::Avx512(avx512) => unsafe { avx512.enabled(work) },
+            Kind::Avx512(avx512) => avx512.run(work),
         }
     }
 }
@@ -244,6 +288,7 @@ impl InstructionSet {
 pub fn prefetch<T>(value: *const T) {
     #[cfg(target_arch = "x86_64")]
     for line in (0..size_of::<T>()).step_by(64) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let line = value.cast::<i8>().wrapping_add(line);
         // SAFETY: the instruction is of SSE and reads nothing: any address will do.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(line) };

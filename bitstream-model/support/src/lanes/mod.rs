@@ -1,10 +1,9 @@
-//! Sixteen numbers side by side, computed together by the SIMD instructions of a processor.
+//! Numbers side by side, computed together by the SIMD instructions of a processor: sixteen on
+//! x86-64, four on aarch64, where a register holds no more and sixteen would be spilled.
 //!
-//! Every operation is written lane by lane in plain Rust, and each lane has the bits of the same
-//! operation on one f32: one rounding, subnormals kept, nothing contracted. The numbers lie in a
-//! vector register type, from which the compiler sees that the sixteen operations are one: so the
-//! code has no intrinsics for arithmetic and is the same for every processor. The exceptions are
-//! operations for which the compiler finds no good instructions: [`Instructions`] has them.
+//! Each lane has the bits of the same operation on one f32: one rounding, subnormals kept, nothing
+//! contracted. [`Instructions`] writes every operation lane by lane; a set of instructions
+//! overrides the operations for which it has one.
 //!
 //! ```text
 //! Work ── InstructionSet::run ──> the work, compiled for AVX-512, for AVX2, or for the target
@@ -13,35 +12,28 @@
 //! [`InstructionSet::run`] enables the instructions around some [`Work`]. All between must be
 //! `#[inline(always)]`: a function that is called apart is compiled for the target alone.
 
-mod halves;
+#[cfg(target_arch = "aarch64")]
+mod aarch64;
 mod instructions;
 #[cfg(test)]
 mod tests;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-use std::array;
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use instructions::{InstructionSet, Instructions, Quad, Work, prefetch};
 
 /// Number of lanes.
-pub const LANES: usize = 16;
+pub const LANES: usize = if cfg!(target_arch = "aarch64") { 4 } else { 16 };
 
-/// A register type as wide as the lanes; a narrower processor uses several registers.
-#[cfg(target_arch = "x86_64")]
-type Register = std::arch::x86_64::__m512;
-#[cfg(target_arch = "aarch64")]
-type Register = [std::arch::aarch64::float32x4_t; LANES / 4];
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-type Register = [f32; LANES];
+/// One bit for each lane, lane 0 in bit 0.
+pub const ALL: u32 = (1 << LANES) - 1;
 
-/// An f32 in each lane.
+/// An f32 in each lane, and the instructions that compute with them.
 #[derive(Clone, Copy)]
-pub struct F32x16(Register);
-
-/// A truth value in each lane: all bits are set, or none.
-#[derive(Clone, Copy)]
-pub struct Mask(Register);
+pub struct F32s<I: Instructions>(I::Register, I);
 
 /// An array with the values of a function of the lane.
 #[inline(always)]
@@ -56,143 +48,131 @@ fn each<T: Copy + Default>(value: impl Fn(usize) -> T) -> [T; LANES] {
     values
 }
 
-impl F32x16 {
+impl<I: Instructions> F32s<I> {
     /// The same number in each lane.
     #[inline(always)]
     #[must_use]
-    pub fn splat(number: f32) -> Self {
-        Self::from_array([number; LANES])
+    pub fn splat(instructions: I, number: f32) -> Self {
+        Self(instructions.splat(number), instructions)
+    }
+
+    /// The same number in each lane, for the same instructions.
+    #[inline(always)]
+    #[must_use]
+    pub fn like(self, number: f32) -> Self {
+        Self::splat(self.1, number)
     }
 
     /// The numbers of an array, the first in lane 0.
     #[inline(always)]
     #[must_use]
-    pub fn from_array(numbers: [f32; LANES]) -> Self {
-        Self(bytemuck::cast(numbers))
+    pub fn from_array(instructions: I, numbers: &[f32; LANES]) -> Self {
+        Self(instructions.load(numbers), instructions)
     }
 
     /// The numbers in the order of the lanes.
     #[inline(always)]
     #[must_use]
     pub fn to_array(self) -> [f32; LANES] {
-        bytemuck::cast(self.0)
+        self.1.store(self.0)
     }
 
-    /// A function of the lane.
+    /// One quad for each lane, by their places in it.
     #[inline(always)]
     #[must_use]
-    pub fn from_fn(number: impl Fn(usize) -> f32) -> Self {
-        Self::from_array(each(number))
+    pub fn columns(instructions: I, quad: impl Fn(usize) -> Quad) -> [Self; 4] {
+        instructions.columns(quad).map(|register| Self(register, instructions))
     }
 
-    /// A function of each number.
+    /// Reads a row of two quads for each lane, by their places in it.
+    ///
+    /// # Safety
+    ///
+    /// The rows that the indices name exist from `rows` on, and no other thread writes them during
+    /// the call.
     #[inline(always)]
     #[must_use]
-    pub fn map(self, function: impl Fn(f32) -> f32) -> Self {
-        let numbers = self.to_array();
-        Self::from_fn(|lane| function(numbers[lane]))
+    pub unsafe fn gather(
+        instructions: I,
+        rows: *const [Quad; 2],
+        indices: &[u32; LANES],
+    ) -> [Self; 8] {
+        // SAFETY: the caller promises it.
+        let registers = unsafe { instructions.gather(rows, indices) };
+        registers.map(|register| Self(register, instructions))
     }
 
-    /// A function of each number and the other's of its lane.
+    /// Writes a row of two quads for each lane, lane after lane.
+    ///
+    /// # Safety
+    ///
+    /// The rows that the indices name exist from `rows` on, and no other thread accesses them
+    /// during the call.
     #[inline(always)]
-    fn zip(self, other: Self, function: impl Fn(f32, f32) -> f32) -> Self {
-        let (numbers, others) = (self.to_array(), other.to_array());
-        Self::from_fn(|lane| function(numbers[lane], others[lane]))
-    }
-
-    /// Whether each number and the other's of its lane satisfy a condition.
-    #[inline(always)]
-    fn test(self, other: Self, condition: impl Fn(f32, f32) -> bool) -> Mask {
-        let (numbers, others) = (self.to_array(), other.to_array());
-        Mask::from_fn(|lane| condition(numbers[lane], others[lane]))
+    pub unsafe fn scatter(columns: [Self; 8], rows: *mut [Quad; 2], indices: &[u32; LANES]) {
+        let [Self(_, instructions), ..] = columns;
+        // SAFETY: the caller promises it.
+        unsafe { instructions.scatter(columns.map(|column| column.0), rows, indices) };
     }
 
     /// The square root.
     #[inline(always)]
     #[must_use]
     pub fn sqrt(self) -> Self {
-        self.map(f32::sqrt)
+        Self(self.1.sqrt(self.0), self.1)
     }
 
     /// The absolute value.
     #[inline(always)]
     #[must_use]
     pub fn abs(self) -> Self {
-        self.map(f32::abs)
+        Self(self.1.abs(self.0), self.1)
     }
 
-    /// The magnitude of this number with the sign of another one, also of a zero.
+    /// One bit per lane: it is larger; not a NaN.
     #[inline(always)]
     #[must_use]
-    pub fn with_sign(self, other: Self) -> Self {
-        self.zip(other, f32::copysign)
+    pub fn above(self, other: Self) -> u32 {
+        self.1.above(self.0, other.0)
     }
 
-    /// Whether it is larger; false for a NaN.
+    /// One bit per lane: it is equal, as both zeros are; not a NaN.
     #[inline(always)]
     #[must_use]
-    pub fn above(self, other: Self) -> Mask {
-        self.test(other, |a, b| a > b)
-    }
-
-    /// Whether it is larger or equal; false for a NaN.
-    #[inline(always)]
-    #[must_use]
-    pub fn at_least(self, other: Self) -> Mask {
-        self.test(other, |a, b| a >= b)
-    }
-
-    /// Whether it is equal, as both zeros are; false for a NaN.
-    #[inline(always)]
-    #[must_use]
-    #[expect(clippy::float_cmp, reason = "equality is what is asked for")]
-    pub fn is(self, other: Self) -> Mask {
-        self.test(other, |a, b| a == b)
+    pub fn is(self, other: Self) -> u32 {
+        self.1.is(self.0, other.0)
     }
 
     /// `if a > b then a else b`: the second of two zeros, and beside a NaN.
     #[inline(always)]
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
+        Self(self.1.larger(self.0, other.0), self.1)
     }
 
     /// `if a < b then a else b`: the second of two zeros, and beside a NaN.
     #[inline(always)]
     #[must_use]
     pub fn smaller(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
+        Self(self.1.smaller(self.0, other.0), self.1)
     }
 
-    /// Selects these lanes where the mask is set, and `other` elsewhere.
+    /// Selects the lanes whose bits are set, and the lanes of `other` elsewhere.
     #[inline(always)]
     #[must_use]
-    pub fn or(self, mask: Mask, other: Self) -> Self {
-        // On the bits: the compiler would make branches of a condition.
-        let mask = mask.words();
-        let (numbers, others) = (self.to_array(), other.to_array());
-        Self::from_fn(|lane| {
-            let (own, other) = (numbers[lane].to_bits(), others[lane].to_bits());
-            f32::from_bits(own & mask[lane] | other & !mask[lane])
-        })
-    }
-
-    /// The sums of the words as whole numbers, which wrap.
-    #[inline(always)]
-    #[must_use]
-    pub fn with_words(self, other: Self) -> Self {
-        self.zip(other, |a, b| f32::from_bits(a.to_bits().wrapping_add(b.to_bits())))
+    pub fn or(self, bits: u32, other: Self) -> Self {
+        Self(self.1.select(bits, self.0, other.0), self.1)
     }
 }
 
 macro_rules! operators {
     ($($operator:ident $method:ident),*) => {$(
-        impl $operator for F32x16 {
+        impl<I: Instructions> $operator for F32s<I> {
             type Output = Self;
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.zip(other, |a, b| $operator::$method(a, b))
+                Self(self.1.$method(self.0, other.0), self.1)
             }
         }
     )*};
@@ -200,107 +180,17 @@ macro_rules! operators {
 
 operators!(Add add, Sub sub, Mul mul, Div div);
 
-impl Neg for F32x16 {
+impl<I: Instructions> Neg for F32s<I> {
     type Output = Self;
 
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|number| -number)
+        Self(self.1.neg(self.0), self.1)
     }
 }
 
-impl fmt::Debug for F32x16 {
+impl<I: Instructions> fmt::Debug for F32s<I> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.to_array().fmt(f)
-    }
-}
-
-impl Mask {
-    /// No lane.
-    #[inline(always)]
-    #[must_use]
-    pub fn none() -> Self {
-        Self::from_words([0; LANES])
-    }
-
-    /// Whether a function of the lane is true.
-    #[inline(always)]
-    #[must_use]
-    pub fn from_fn(is_set: impl Fn(usize) -> bool) -> Self {
-        Self::from_words(each(|lane| if is_set(lane) { u32::MAX } else { 0 }))
-    }
-
-    /// One bit per lane, lane 0 in bit 0.
-    #[inline(always)]
-    #[must_use]
-    pub fn from_bits(bits: u32) -> Self {
-        Self::from_fn(|lane| bits & 1 << lane != 0)
-    }
-
-    #[inline(always)]
-    fn from_words(words: [u32; LANES]) -> Self {
-        Self(bytemuck::cast(words))
-    }
-
-    #[inline(always)]
-    fn words(self) -> [u32; LANES] {
-        bytemuck::cast(self.0)
-    }
-
-    /// A function of the words of two masks.
-    #[inline(always)]
-    fn zip(self, other: Self, function: impl Fn(u32, u32) -> u32) -> Self {
-        let (words, others) = (self.words(), other.words());
-        Self::from_words(each(|lane| function(words[lane], others[lane])))
-    }
-
-    /// Set where both are.
-    #[inline(always)]
-    #[must_use]
-    pub fn and(self, other: Self) -> Self {
-        self.zip(other, |a, b| a & b)
-    }
-
-    /// Set where one of both is.
-    #[inline(always)]
-    #[must_use]
-    pub fn either(self, other: Self) -> Self {
-        self.zip(other, |a, b| a | b)
-    }
-
-    /// Set where `self` is set and `other` is not.
-    #[inline(always)]
-    #[must_use]
-    pub fn without(self, other: Self) -> Self {
-        self.zip(other, |a, b| a & !b)
-    }
-
-    /// Whether a lane is set.
-    #[inline(always)]
-    #[must_use]
-    pub fn any(self) -> bool {
-        self.words().iter().fold(0, |all, word| all | word) != 0
-    }
-
-    /// Whether every lane is set.
-    #[inline(always)]
-    #[must_use]
-    pub fn all(self) -> bool {
-        self.words().iter().fold(u32::MAX, |all, word| all & word) != 0
-    }
-
-    /// One bit per lane, lane 0 in bit 0. Takes longer than [`any`](Self::any) and
-    /// [`all`](Self::all).
-    #[inline(always)]
-    #[must_use]
-    pub fn bits(self) -> u32 {
-        let bits = array::from_fn::<u32, LANES, _>(|lane| 1 << lane);
-        self.words().iter().zip(bits).fold(0, |all, (word, bit)| all | word & bit)
-    }
-}
-
-impl fmt::Debug for Mask {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Mask({:#06x})", self.bits())
     }
 }

@@ -59,9 +59,9 @@ pub struct BuildArgs {
     /// a step; no result depends on their number [default: one per processor, at most 4]
     #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
     threads: Option<usize>,
-    /// Compute independent collisions in SIMD lanes; no result depends on it [default: on]
-    #[arg(long, value_parser = choice("lanes", |build| build.lanes))]
-    lanes: Option<bool>,
+    /// Take whole steps of the emulated board at once; no result depends on it [default: on]
+    #[arg(long, value_parser = choice("fast", |build| build.fast))]
+    fast: Option<bool>,
 }
 
 impl BuildArgs {
@@ -79,7 +79,7 @@ impl BuildArgs {
             address_width: self.address_width,
             fence: self.fence,
             threads: self.threads,
-            lanes: self.lanes,
+            fast: self.fast,
         }
     }
 }
@@ -123,7 +123,7 @@ pub fn board_option(build: &Build) -> Option<String> {
 /// A board as its text, without what changes no result. Where no text tells all number formats, as
 /// for a bitstream that this command cannot build, the formats follow in words.
 pub fn described(config: &BoardConfig) -> String {
-    let build = Build { threads: None, lanes: None, ..Build::of(config) };
+    let build = Build { threads: None, fast: None, ..Build::of(config) };
     let variant = config.variant();
     if build.config().variant() == variant {
         return build.to_string();
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn each_option_of_the_command_line_is_that_of_a_text() {
         let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
-                    length-width=14,address-width=32,fence=0x50000000+64M,threads=3,lanes=off";
+                    length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
         let expected: Build = text.parse().expect("a build");
         let options = Build::keys()
             .map(|key| format!("--{key}={}", expected.value(key).expect("given in the text")));
@@ -174,7 +174,7 @@ mod tests {
     fn every_option_is_named_when_it_is_given() {
         assert_eq!(board_option(&Build::default()), None);
         for (key, value) in
-            [("arithmetic", "f32"), ("hazards", "unchecked"), ("lanes", "off"), ("profile", "half")]
+            [("arithmetic", "f32"), ("hazards", "unchecked"), ("fast", "off"), ("profile", "half")]
         {
             let mut build = Build::default();
             build.set(key, value).expect(key);
@@ -207,7 +207,7 @@ mod tests {
         for text in ["float", "naive,flush", "float,world", "half,f32"] {
             assert_eq!(described(&text.parse::<Build>().expect(text).config()), text);
         }
-        let of_this_machine: Build = "float,threads=1,lanes=off".parse().expect("a build");
+        let of_this_machine: Build = "float,threads=1,fast=off".parse().expect("a build");
         assert_eq!(described(&of_this_machine.config()), "float");
     }
 }

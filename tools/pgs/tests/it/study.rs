@@ -92,7 +92,7 @@ fn orders_lead_further_apart_step_by_step_and_the_same_way_every_time() {
     assert!(apart(70) > 2.0 * apart(12) && apart(12) > 0.0, "{} {}", apart(12), apart(70));
     let over = |step: usize| number(&document["over_pairs"][step - 1]["position_mean_m"]["mean"]);
     assert!(over(5) <= 0.0 && over(12) > 0.0, "{} {}", over(5), over(12));
-    let again = study(&[&scene[..], &["--threads", "1", "--lanes", "off"]].concat());
+    let again = study(&[&scene[..], &["--threads", "1", "--fast", "off"]].concat());
     for part in ["gpu", "pairs", "over_pairs"] {
         assert_eq!(again[part], document[part], "{part}");
     }

@@ -93,7 +93,7 @@ impl Taken {
 #[test]
 fn a_recorded_step_of_the_driver_is_the_step() {
     let taken = Taken::new(BoardConfig::default());
-    let bare = Taken::new(BoardConfig { shortcuts: false, ..BoardConfig::default() });
+    let bare = Taken::new(BoardConfig { fast: false, ..BoardConfig::default() });
     assert_eq!(taken.bodies, bare.bodies);
     assert_eq!(taken.recording, bare.recording);
     let [report, without] = [&taken, &bare].map(|one| one.report.as_ref().expect("no fault"));

@@ -51,6 +51,18 @@ impl Arbiter {
         Self { engines, supply }
     }
 
+    /// Cycles in which the bandwidth carries some beats.
+    pub(crate) fn cycles(&self, beats: usize) -> u64 {
+        self.supply.map_or(0, |Supply { income, beat_cost, .. }| {
+            (beats as u64).saturating_mul(beat_cost).div_ceil(income.max(1))
+        })
+    }
+
+    /// Cycles of bandwidth that are saved up while nobody moves beats.
+    pub(crate) fn saved_cycles(&self) -> u64 {
+        self.supply.map_or(0, |Supply { income, reserve, .. }| reserve / income.max(1))
+    }
+
     /// Gives every engine a burst in turn for some cycles, until no engine has beats to move or the
     /// bandwidth is used up. `burst(engine, limit)` moves up to `limit` beats and returns their
     /// number. Returns whether the bandwidth holds the engines up.
