@@ -3,11 +3,12 @@
 use super::Accelerator;
 use super::arithmetic::inertia;
 use super::arithmetic::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
-use super::integrate::{Pose, integrate};
+use super::integrate::integrate;
 use super::records::array::Row;
 use super::records::decode::{self, Collision};
 use super::records::segment::{Beats, PacketError, Reader};
-use super::solver::{self, Impulses, Mass, Velocity};
+use super::solver::{self, Impulses, Mass};
+use super::state::{Pose, Velocity};
 use crate::cast::register;
 use crate::config::Subnormals;
 use pgs_interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
