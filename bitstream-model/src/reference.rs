@@ -1,5 +1,5 @@
-//! The reference solver on plain data: a step of the specification (§7) without streams, registers or a
-//! clock, in the arithmetic of either precision.
+//! The reference solver on plain data: a step of the specification (§7) without streams, registers
+//! or a clock, in the arithmetic of either precision.
 
 use crate::accelerator::arithmetic::inertia::Isotropic;
 use crate::accelerator::arithmetic::number::{Format, Half, Number, Single};

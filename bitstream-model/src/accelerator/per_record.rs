@@ -22,7 +22,8 @@ fn to_fixed(value: f64) -> u64 {
     value as u64
 }
 
-/// The sum of a collision's normal impulses after the last contact pass, as the accumulator adds it.
+/// The sum of a collision's normal impulses after the last contact pass, as the accumulator adds
+/// it.
 #[inline]
 pub(crate) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
     let sum = f64::from(solver::normal_sum::<U>(impulses));
@@ -179,7 +180,8 @@ impl Accelerator {
         *velocities = velocities.map(|velocity| self.stored_velocity(velocity));
     }
 
-    /// The pose and velocity that a body leaves with. `free` tells whether its inverse mass is not 0.
+    /// The pose and velocity that a body leaves with. `free` tells whether its inverse mass is not
+    /// 0.
     pub(super) fn integrated(
         &self,
         free: bool,
