@@ -25,7 +25,7 @@ pub use crate::violation::{RegisterAccess, Violation, ViolationKind};
 pub use axi_dma::PacketCount;
 pub use board::Counts;
 pub use config::quirks::{Coherency, InterruptWiring, Master, Quirks, Resettable};
-pub use config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, Subnormals, THREADS_MAX};
+pub use config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, THREADS_MAX};
 pub use fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When};
 pub use handle::{CpuPort, EmulatedBoard};
 pub use memory::external::DeviceMemory;

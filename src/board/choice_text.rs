@@ -74,7 +74,7 @@ mod tests {
         assert!(matches!(choice("devmem"), Ok(BoardChoice::DevMem(_))));
         let default = BoardConfig::default();
         assert!(matches!(choice("emulated"), Ok(BoardChoice::Built(config)) if config == default));
-        assert!(matches!(choice("emulated:half,flush"), Ok(BoardChoice::Built(config))
+        assert!(matches!(choice("emulated:half,f32"), Ok(BoardChoice::Built(config))
             if config.profile.name == "half"));
         let socket = choice("socket:/tmp/a:b").expect("a socket");
         assert!(matches!(socket, BoardChoice::Served { socket } if socket.ends_with("a:b")));

@@ -49,7 +49,7 @@ impl OpenOptions {
     /// use zynq_pgs::{Accelerator, OpenOptions};
     ///
     /// # fn main() -> Result<(), zynq_pgs::Error> {
-    /// let accelerator = Accelerator::open(OpenOptions::emulated("half,flush")?)?;
+    /// let accelerator = Accelerator::open(OpenOptions::emulated("half,unchecked")?)?;
     /// assert_eq!(accelerator.capabilities().variant.profile.name, "half");
     /// # Ok(())
     /// # }

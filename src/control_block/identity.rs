@@ -27,8 +27,6 @@ pub struct Capabilities {
     pub version: (u32, u32),
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
     pub interlocked: bool,
-    /// Whether subnormal numbers count as zero.
-    pub flush_subnormals: bool,
     /// Streams into the accelerator.
     pub mm2s_channels: usize,
     /// Streams out of the accelerator.
@@ -202,7 +200,6 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         variant,
         version: (major, minor),
         interlocked: features::INTERLOCKED.is_set(able),
-        flush_subnormals: features::FLUSH_SUBNORMALS.is_set(able),
         mm2s_channels: channels::MM2S.of(streams) as usize,
         s2mm_channels: channels::S2MM.of(streams) as usize,
         initiation_interval: issue::INTERVAL.of(interval),
@@ -339,7 +336,7 @@ mod tests {
     fn a_known_bitstream_is_described() {
         let found = identify_with(&[]).expect("well formed");
         assert_eq!((found.variant, found.version), (FLOAT.default_variant(), (2, 0)));
-        assert!(found.interlocked && !found.flush_subnormals);
+        assert!(found.interlocked);
         assert_eq!((found.mm2s_channels, found.s2mm_channels), (4, 4));
         assert_eq!(found.contact, Depth { fill: 374, window: 324 });
         assert_eq!((found.bytes_per_body, found.bytes_per_collision), (24, 16));

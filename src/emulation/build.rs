@@ -1,6 +1,6 @@
 //! The options of a build, and the configuration that they make.
 
-use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use bitstream_model::{Bandwidth, BoardConfig, Hazards};
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{FLOAT, Inertia, Profile};
@@ -22,8 +22,6 @@ pub struct Build {
     pub hazards: Option<Hazards>,
     /// Hazard window, issue slots.
     pub window: Option<u32>,
-    /// Arithmetic on subnormal numbers.
-    pub subnormals: Option<Subnormals>,
     /// Memory bandwidth.
     pub bandwidth: Option<Bandwidth>,
     /// Width of the DMA length registers, bits.
@@ -54,7 +52,6 @@ impl Build {
             inertia: self.inertia.unwrap_or(default.inertia),
             hazards: self.hazards.unwrap_or(default.hazards),
             window_slots: self.window,
-            subnormals: self.subnormals.unwrap_or(default.subnormals),
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
             length_width: self.length_width.unwrap_or(default.length_width),
             address_width: self.address_width.unwrap_or(default.address_width),
@@ -92,7 +89,6 @@ impl Build {
             inertia: unlike(config.inertia, default.inertia),
             hazards: unlike(config.hazards, default.hazards),
             window: config.window_slots,
-            subnormals: unlike(config.subnormals, default.subnormals),
             bandwidth: unlike(config.bandwidth, default.bandwidth),
             length_width: unlike(config.length_width, default.length_width),
             address_width: unlike(config.address_width, default.address_width),

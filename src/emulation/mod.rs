@@ -20,7 +20,6 @@
 //! | `arithmetic` | precision of the operators: `f32`, `binary16` | the profile's |
 //! | `hazards` | on a hazard wait, or read the stale velocity: `interlocked`, `unchecked` | `interlocked` |
 //! | `window` | hazard window in issue slots | the profile's |
-//! | `subnormals` | keep subnormal numbers, or flush them to zero: `keep`, `flush` | `keep` |
 //! | `inertia` | inertia of a body, equal about every axis or any: `isotropic`, `world` | `isotropic` |
 //! | `bandwidth` | memory bandwidth in GB/s, or `unlimited` | 12.8 |
 //! | `length-width` | width of the DMA length registers, bits | 26 |

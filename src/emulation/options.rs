@@ -4,8 +4,8 @@ use pgs_interface::profile::{PROFILES, Profile};
 
 use super::build::Build;
 use super::values::{
-    HAZARDS, INERTIA, PRECISIONS, SUBNORMALS, SWITCH, address_width, bandwidth, bandwidth_text,
-    fence, length_width, name_of, named, threads, window,
+    HAZARDS, INERTIA, PRECISIONS, SWITCH, address_width, bandwidth, bandwidth_text, fence,
+    length_width, name_of, named, threads, window,
 };
 
 /// One option of a build.
@@ -66,12 +66,11 @@ const PROFILE: BuildOption = BuildOption {
 };
 
 /// Every option, in the order of a text.
-pub(super) const OPTIONS: [BuildOption; 12] = [
+pub(super) const OPTIONS: [BuildOption; 11] = [
     PROFILE,
     choice!("arithmetic", arithmetic, PRECISIONS, true),
     choice!("hazards", hazards, HAZARDS, true),
     number!("window", window, "SLOTS", window, |slots| slots.to_string()),
-    choice!("subnormals", subnormals, SUBNORMALS, true),
     choice!("inertia", inertia, INERTIA, true),
     number!("bandwidth", bandwidth, "GBPS|unlimited", bandwidth, bandwidth_text),
     number!("length-width", length_width, "BITS", length_width, |bits| bits.to_string()),

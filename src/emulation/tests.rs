@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bitstream_model::{Bandwidth, EmulatedBoard, Hazards, Subnormals};
+use bitstream_model::{Bandwidth, EmulatedBoard, Hazards};
 use pgs_interface::fence::Fence;
 use pgs_interface::number::Precision;
 use pgs_interface::profile::{Inertia, PROFILES, Profile};
@@ -23,7 +23,7 @@ fn a_build_is_written_as_it_is_read() {
         "float,interlocked",
         "half,f32,unchecked",
         "float,unchecked,world",
-        "half,binary16,interlocked,window=64,flush,isotropic",
+        "half,binary16,interlocked,window=64,isotropic",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
         "float,fence=0x40000000+512M",
         "float,bandwidth=17.07,threads=1,fast=off",
@@ -36,13 +36,13 @@ fn a_build_is_written_as_it_is_read() {
 
 #[test]
 fn words_may_stand_in_any_order() {
-    let expected = build("half,f32,unchecked,flush");
-    assert_eq!(build("half,flush,unchecked,arithmetic=f32"), expected);
+    let expected = build("half,f32,unchecked,world");
+    assert_eq!(build("half,world,unchecked,arithmetic=f32"), expected);
 }
 
 #[test]
 fn a_word_means_what_the_option_means() {
-    let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+    let text = "half,f32,unchecked,window=9,world,bandwidth=unlimited,\
                 length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
     let expected = Build {
         profile: Profile::by_name("half"),
@@ -50,7 +50,6 @@ fn a_word_means_what_the_option_means() {
         inertia: Some(Inertia::World),
         hazards: Some(Hazards::Unchecked),
         window: Some(9),
-        subnormals: Some(Subnormals::Flush),
         bandwidth: Some(Bandwidth::Unlimited),
         length_width: Some(14),
         address_width: Some(32),
@@ -83,14 +82,13 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
             error.to_string(),
             format!(
                 "{:?} is no option of a build: give one of f32, binary16, \
-                 interlocked, unchecked, window=SLOTS, keep, flush, \
-                 isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
+                 interlocked, unchecked, window=SLOTS, isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
                  address-width=BITS, fence=BASE+BYTES, threads=N, fast=on|off",
                 text.split_once(',').expect("two words").1
             )
         );
     }
-    for (text, key) in [("float,keep,flush", "subnormals"), ("float,half", "profile")] {
+    for (text, key) in [("float,world,isotropic", "inertia"), ("float,half", "profile")] {
         let error = build(text).expect_err("twice");
         assert_eq!(error.to_string(), format!("{key} is given twice: give it once"));
     }
@@ -125,25 +123,21 @@ fn any_build() -> impl Strategy<Value = Build> {
         any_of(Precision::ALL),
         (any_of([Inertia::Isotropic, Inertia::World]), any_of([true, false])),
         any_of([Hazards::Interlocked, Hazards::Unchecked]),
-        any_of([Subnormals::Keep, Subnormals::Flush]),
         (prop::option::of(1..=u32::MAX), prop::option::of(rate), prop::option::of(1_usize..=31)),
         (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64), any_of(fences)),
     )
-        .prop_map(|(profile, arithmetic, choices, hazards, subnormals, numbers, widths)| {
-            Build {
-                profile: Some(profile),
-                arithmetic,
-                inertia: choices.0,
-                fast: choices.1,
-                hazards,
-                subnormals,
-                window: numbers.0,
-                bandwidth: numbers.1,
-                threads: numbers.2,
-                length_width: widths.0,
-                address_width: widths.1,
-                fence: widths.2,
-            }
+        .prop_map(|(profile, arithmetic, choices, hazards, numbers, widths)| Build {
+            profile: Some(profile),
+            arithmetic,
+            inertia: choices.0,
+            fast: choices.1,
+            hazards,
+            window: numbers.0,
+            bandwidth: numbers.1,
+            threads: numbers.2,
+            length_width: widths.0,
+            address_width: widths.1,
+            fence: widths.2,
         })
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
-use bitstream_model::{Bandwidth, Hazards, Subnormals, THREADS_MAX};
+use bitstream_model::{Bandwidth, Hazards, THREADS_MAX};
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::fence::{Fence, NoFence};
 use pgs_interface::number::Precision;
@@ -16,8 +16,6 @@ pub(super) const PRECISIONS: [Named<Precision>; 2] =
     [(Precision::F32.name(), Precision::F32), (Precision::Binary16.name(), Precision::Binary16)];
 pub(super) const HAZARDS: [Named<Hazards>; 2] =
     [("interlocked", Hazards::Interlocked), ("unchecked", Hazards::Unchecked)];
-pub(super) const SUBNORMALS: [Named<Subnormals>; 2] =
-    [("keep", Subnormals::Keep), ("flush", Subnormals::Flush)];
 pub(super) const INERTIA: [Named<Inertia>; 2] =
     [("isotropic", Inertia::Isotropic), ("world", Inertia::World)];
 pub(super) const SWITCH: [Named<bool>; 2] = [("on", true), ("off", false)];

@@ -92,7 +92,7 @@ mod tests {
     };
 
     fn check_on(profile: &'static Profile, body: &Body) -> Result<(), InputError> {
-        check_body(7, body, &scene_on(&profile.default_variant(), false))
+        check_body(7, body, &scene_on(&profile.default_variant()))
     }
 
     fn check(body: &Body) -> Result<(), InputError> {

@@ -43,8 +43,6 @@ use pgs_interface::profile::Variant;
 pub(crate) struct Limits {
     /// Its profile, formats and inertia.
     pub(crate) variant: Variant,
-    /// Whether subnormal numbers count as zero.
-    pub(crate) flush_subnormals: bool,
     /// Largest number of bodies, whatever the memory.
     pub(crate) body_capacity: u32,
     /// Largest number of collisions, whatever the memory.
@@ -64,7 +62,6 @@ impl Limits {
     pub(crate) fn of(capabilities: &Capabilities) -> Self {
         Self {
             variant: capabilities.variant,
-            flush_subnormals: capabilities.flush_subnormals,
             // An index has to name every body, whatever capacity the bitstream reports.
             body_capacity: capabilities.body_capacity.min(capabilities.variant.body_capacity()),
             collision_capacity: capabilities.collision_capacity,
@@ -80,7 +77,6 @@ impl Limits {
     pub(crate) const fn roomy(variant: Variant) -> Self {
         Self {
             variant,
-            flush_subnormals: false,
             body_capacity: u32::MAX,
             collision_capacity: u32::MAX,
             shape_capacity: u32::MAX,
@@ -157,10 +153,9 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
         check_shapes(shapes, &needs, limits)?;
     }
     let held = Held::by(&limits.variant.numbers);
-    let flush_subnormals = limits.flush_subnormals;
     let StepParameters { kinematic, pair_friction, .. } = *parameters;
     let variant = &limits.variant;
-    Ok(Scene { shapes, needs, variant, held, flush_subnormals, kinematic, pair_friction })
+    Ok(Scene { shapes, needs, variant, held, kinematic, pair_friction })
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
@@ -201,7 +196,6 @@ pub(crate) struct Scene<'a> {
     needs: SceneNeeds,
     variant: &'a Variant,
     held: Held,
-    flush_subnormals: bool,
     /// Whether static bodies may move.
     pub(crate) kinematic: bool,
     /// Whether each collision has a friction of its own.
@@ -266,7 +260,6 @@ pub(crate) mod tests {
     };
     pub(crate) const FLOAT: Limits = Limits {
         variant: profile::FLOAT.default_variant(),
-        flush_subnormals: false,
         body_capacity: 131_072,
         collision_capacity: 262_144,
         shape_capacity: 64,
@@ -281,11 +274,11 @@ pub(crate) mod tests {
     pub(crate) const UNUSED: Contact = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
 
     /// The context of checks on a bitstream of `variant`.
-    pub(crate) fn scene_on(variant: &Variant, flush_subnormals: bool) -> Scene<'_> {
+    pub(crate) fn scene_on(variant: &Variant) -> Scene<'_> {
         let held = Held::by(&variant.numbers);
         let (kinematic, pair_friction) = (false, false);
         let (shapes, needs) = (&SHAPES, NEEDS);
-        Scene { shapes, needs, variant, held, flush_subnormals, kinematic, pair_friction }
+        Scene { shapes, needs, variant, held, kinematic, pair_friction }
     }
 
     fn body(shape: u32) -> Body {

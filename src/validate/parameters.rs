@@ -3,7 +3,7 @@
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
 
-use super::range::{computes_short, smallest_short};
+use super::range::{SMALLEST_SHORT, computes_short};
 use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds};
 use crate::scene::StepParameters;
 
@@ -57,11 +57,10 @@ pub(crate) fn check_parameters(
         let (format, component) = (StreamFormat::Binary16, 0);
         let largest = format.largest();
         for (field, found, ..) in checks {
-            let nonzero = smallest_short(limits.flush_subnormals);
             let (zero, smallest) = match field {
                 // Its reciprocal must fit, too.
-                TIME_STEP => (false, nonzero.max(1.0 / largest)),
-                _ => (true, nonzero),
+                TIME_STEP => (false, 1.0 / largest),
+                _ => (true, SMALLEST_SHORT),
             };
             let fits = (smallest..=largest).contains(&found.abs()) || (zero && found == 0.0);
             if !fits {
@@ -208,10 +207,8 @@ mod tests {
         let time = |time_step| StepParameters { time_step, ..StepParameters::default() };
         let text = check(&time(1e-5), &HALF).expect_err("its reciprocal overflows");
         assert!(text.contains("time step is 1e-5") && text.contains("takes 1.5266"), "{text}");
-        let flush = Limits { flush_subnormals: true, ..HALF };
         assert_eq!(check(&time(5e-5), &HALF), Ok(()));
-        assert!(check(&time(5e-5), &flush).is_err(), "subnormal in binary16");
-        assert_eq!(check(&time(1e-5), &Limits { flush_subnormals: true, ..FLOAT }), Ok(()));
+        assert_eq!(check(&time(1e-5), &FLOAT), Ok(()));
     }
 
     #[test]
@@ -225,23 +222,19 @@ mod tests {
             ("spin damping", |parameters, value| parameters.spin_damping = value),
             ("gravity in y", |parameters, value| parameters.gravity[1] = -value),
         ];
-        let flush = Limits { flush_subnormals: true, ..HALF };
-        let (normal, subnormal) = (2.0_f32.powi(-14), 2.0_f32.powi(-24));
+        let smallest = 2.0_f32.powi(-24);
         for (name, set) in sets {
             let check = |value, limits| {
                 let mut parameters = StepParameters::default();
                 set(&mut parameters, value);
                 check_parameters(&parameters, &NEEDS, limits).map_err(|error| error.to_string())
             };
-            for (limits, smallest) in [(&HALF, subnormal), (&flush, normal)] {
-                assert_eq!(check(0.0, limits), Ok(()), "{name}");
-                assert_eq!(check(smallest, limits), Ok(()), "{name}");
-                let text = check(smallest.next_down(), limits).expect_err(name);
-                assert!(text.contains(name), "{text}");
-                assert!(text.contains(&format!("takes 0, or {smallest:e} to 65504")), "{text}");
-            }
-            let f32 = Limits { flush_subnormals: true, ..FLOAT };
-            assert_eq!(check(1e-30, &f32), Ok(()), "{name}");
+            assert_eq!(check(0.0, &HALF), Ok(()), "{name}");
+            assert_eq!(check(smallest, &HALF), Ok(()), "{name}");
+            let text = check(smallest.next_down(), &HALF).expect_err(name);
+            assert!(text.contains(name), "{text}");
+            assert!(text.contains(&format!("takes 0, or {smallest:e} to 65504")), "{text}");
+            assert_eq!(check(1e-30, &FLOAT), Ok(()), "{name}");
         }
     }
 }

@@ -51,7 +51,7 @@ impl<'a> Quick<'a> {
         let short_rows = scene.variant.numbers.rows == Precision::Binary16
             && held.collisions != StreamFormat::F32;
         Self {
-            short_rows: short_rows.then(|| Extremes::new(scene.shapes, scene.flush_subnormals)),
+            short_rows: short_rows.then(|| Extremes::new(scene.shapes)),
             bodies: Largest([linear, angular, position, orientation]),
             #[cfg(test)]
             doubted: AtomicUsize::new(0),
@@ -137,7 +137,7 @@ impl<'a> Quick<'a> {
             let reach = Reach::new(&locations, collision.count);
             let ends = [collision.body_a, collision.body_b].map(|body| block.ends.get(body));
             let shapes = ends.map(|end| end.shape(self.scene.shapes));
-            surely_fit(&reach, shapes, self.scene.flush_subnormals) | collision.is_empty()
+            surely_fit(&reach, shapes) | collision.is_empty()
         })
     }
 

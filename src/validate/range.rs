@@ -76,11 +76,8 @@ pub(crate) const fn computes_short(numbers: &Numbers) -> bool {
     !matches!((numbers.rows, numbers.updates), (Precision::F32, Precision::F32))
 }
 
-/// The smallest magnitude that binary16 does not round or flush to 0.
-pub(crate) const fn smallest_short(flush_subnormals: bool) -> f32 {
-    // 2^-14, or the subnormal 2^-24.
-    if flush_subnormals { 1.0 / 16_384.0 } else { 1.0 / 16_777_216.0 }
-}
+/// The smallest magnitude that binary16 does not round to 0, the subnormal 2^-24.
+pub(crate) const SMALLEST_SHORT: f32 = 1.0 / 16_777_216.0;
 
 /// The number of vectors that [`vectors`] lists.
 const VECTORS: usize = 3;
@@ -177,7 +174,7 @@ mod tests {
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), InputError> {
-        check_range(7, collision, positions, &scene_on(&profile.default_variant(), false))
+        check_range(7, collision, positions, &scene_on(&profile.default_variant()))
     }
 
     fn far(contact: Contact) -> Collision {
@@ -241,7 +238,7 @@ mod tests {
     #[test]
     fn impulses_are_held_against_the_narrowest_place_on_their_way() {
         let of = |profile: &'static Profile, impulses: &Impulses| {
-            check_impulses(7, impulses, &scene_on(&profile.default_variant(), false))
+            check_impulses(7, impulses, &scene_on(&profile.default_variant()))
         };
         let beyond = 65_504.0_f32.next_up();
         let edge = Impulses { normal: [0.0, -65_504.0, 0.0, 0.0], friction: [65_504.0; 2] };

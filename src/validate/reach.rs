@@ -3,7 +3,7 @@
 
 use pgs_interface::record::{CONTACT_POINTS, LANES};
 
-use super::rows::{LARGEST, LONGEST_ARM, LOSS, largest};
+use super::rows::{LARGEST, LONGEST_ARM, LOSS};
 use crate::record::largest::MAGNITUDE;
 use crate::record::used;
 use crate::scene::Shape;
@@ -86,14 +86,14 @@ fn square(arm: Lanes) -> f32 {
 /// Whether a bitstream that computes rows in binary16 surely computes the rows of a collision. Its
 /// bodies have these shapes, and its numbers are in range.
 #[inline]
-pub(crate) fn surely_fit(reach: &Reach, shapes: [&Shape; 2], flush: bool) -> bool {
+pub(crate) fn surely_fit(reach: &Reach, shapes: [&Shape; 2]) -> bool {
     let [a, b] = shapes;
     let mass = a.inverse_mass + b.inverse_mass;
     let mut turning = [0.0; 2];
     for ((turning, shape), arm) in turning.iter_mut().zip(shapes).zip(reach.arms) {
         *turning = largest_inertia(shape) * square(with_loss(arm, reach.sum));
     }
-    near(reach.sum) & (mass >= 1.0 / LARGEST) & (mass + turning[0] + turning[1] <= largest(flush))
+    near(reach.sum) & (mass >= 1.0 / LARGEST) & (mass + turning[0] + turning[1] <= LARGEST)
 }
 
 /// The furthest reach of several collisions.
@@ -128,11 +128,11 @@ impl Furthest {
     #[inline(always)]
     pub(crate) fn all_surely_fit(&self, shapes: &Extremes) -> bool {
         let turning = shapes.inertia * square(with_loss(self.turning, self.sum));
-        near(self.sum) & shapes.allow() & (shapes.mass + turning + turning <= shapes.largest)
+        near(self.sum) & shapes.allow() & (shapes.mass + turning + turning <= LARGEST)
     }
 }
 
-/// Extreme values of two bodies with shapes from a table, and the bound on their rows.
+/// Extreme values of two bodies with shapes from a table.
 #[derive(Debug)]
 pub(crate) struct Extremes {
     /// The smallest and the largest sum of two bodies' inverse masses, 1/kg.
@@ -140,28 +140,24 @@ pub(crate) struct Extremes {
     mass: f32,
     /// The largest component of an inverse inertia, 1/(kg m²).
     inertia: f32,
-    /// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
-    largest: f32,
 }
 
 impl Extremes {
     /// The extremes of these shapes.
-    pub(crate) fn new(shapes: &[Shape], flush: bool) -> Self {
+    pub(crate) fn new(shapes: &[Shape]) -> Self {
         let moving = shapes.iter().filter(|shape| !shape.is_static());
-        let start =
-            Self { smallest_mass: f32::INFINITY, mass: 0.0, inertia: 0.0, largest: largest(flush) };
+        let start = Self { smallest_mass: f32::INFINITY, mass: 0.0, inertia: 0.0 };
         moving.fold(start, |all, shape| Self {
             smallest_mass: all.smallest_mass.min(shape.inverse_mass),
             mass: all.mass.max(shape.inverse_mass + shape.inverse_mass),
             inertia: all.inertia.max(largest_inertia(shape)),
-            ..all
         })
     }
 
     /// Whether the masses let all rows fit, however short the lever arms are.
     #[inline(always)]
     pub(crate) fn allow(&self) -> bool {
-        (self.smallest_mass >= 1.0 / LARGEST) & (self.mass <= self.largest)
+        (self.smallest_mass >= 1.0 / LARGEST) & (self.mass <= LARGEST)
     }
 }
 
@@ -216,19 +212,19 @@ mod tests {
             self.shapes.map(|shape| &table[shape])
         }
 
-        fn surely_fits(&self, table: &[Shape], flush: bool) -> bool {
-            surely_fit(&self.reach(), self.shapes(table), flush)
+        fn surely_fits(&self, table: &[Shape]) -> bool {
+            surely_fit(&self.reach(), self.shapes(table))
         }
 
         /// The verdict of validation.
-        fn fits(&self, table: &[Shape], flush: bool) -> bool {
+        fn fits(&self, table: &[Shape]) -> bool {
             let (collision, positions) = (&self.collision, self.positions);
             let rows = Rows { index: 0, collision, positions, shapes: self.shapes(table) };
-            rows.fit(&HALF.default_variant(), flush)
+            rows.fit(&HALF.default_variant())
         }
     }
 
-    fn together(all: &[One], table: &[Shape], flush: bool) -> bool {
+    fn together(all: &[One], table: &[Shape]) -> bool {
         let mut furthest = Furthest::new();
         for one in all {
             let still = one
@@ -236,7 +232,7 @@ mod tests {
                 .map(|shape| Lanes::all(if shape.is_static() { u32::MAX } else { 0 }));
             furthest.take(&one.reach(), still);
         }
-        furthest.all_surely_fit(&Extremes::new(table, flush))
+        furthest.all_surely_fit(&Extremes::new(table))
     }
 
     fn at(positions: [[f32; 3]; 2], point: [f32; 3], shapes: [usize; 2]) -> One {
@@ -251,7 +247,7 @@ mod tests {
         let table = [GROUND, CUBE];
         let on_ground = at([[0.0; 3], [100.0, 0.5, 90.0]], [100.5, 0.0, 90.5], [0, 1]);
         let above = at([[100.0, 0.5, 90.0], [100.0, 1.5, 90.0]], [100.5, 1.0, 90.5], [1, 1]);
-        assert!(together(&[on_ground.clone(), above.clone()], &table, true));
+        assert!(together(&[on_ground.clone(), above.clone()], &table));
     }
 
     /// A pebble's inertia with a cube's arm does not fit, but no collision has both.
@@ -261,8 +257,8 @@ mod tests {
         let cubes = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [1, 1]);
         let pebbles = at([[5.0, 0.0, 0.0], [5.1, 0.0, 0.0]], [5.05, 0.0, 0.0], [2, 2]);
         let all = [cubes, pebbles];
-        assert!(!together(&all, &table, false));
-        assert!(all.iter().all(|one| one.surely_fits(&table, false)));
+        assert!(!together(&all, &table));
+        assert!(all.iter().all(|one| one.surely_fits(&table)));
     }
 
     /// The sum of the four points is out of range, although the lever arms are short.
@@ -272,9 +268,9 @@ mod tests {
         for (x, fits) in [(7_000.0, true), (16_100.0, false), (-16_100.0, false)] {
             let far = at([[x, 0.0, 0.0]; 2], [x, 0.0, 0.0], [1, 1]);
             let near = at([[0.0; 3]; 2], [1.0, 0.0, 0.0], [0, 1]);
-            assert_eq!(far.fits(&table, false), fits);
-            assert_eq!(far.surely_fits(&table, false), fits);
-            assert_eq!(together(&[far, near], &table, false), fits);
+            assert_eq!(far.fits(&table), fits);
+            assert_eq!(far.surely_fits(&table), fits);
+            assert_eq!(together(&[far, near], &table), fits);
         }
     }
 
@@ -288,7 +284,7 @@ mod tests {
             (vec![GROUND, CUBE, heavy], false),
             (vec![GROUND, CUBE, light], false),
         ] {
-            assert_eq!(Extremes::new(&table, false).allow(), allowed);
+            assert_eq!(Extremes::new(&table).allow(), allowed);
         }
     }
 
@@ -300,9 +296,9 @@ mod tests {
             rod.inverse_inertia[component] = 30_000.0;
             for (table, fits) in [([GROUND, CUBE], true), ([GROUND, rod], false)] {
                 let one = at([[0.0; 3], [2.0, 0.0, 0.0]], [1.0, 0.0, 0.0], [0, 1]);
-                assert_eq!(one.fits(&table, true), fits);
-                assert_eq!(one.surely_fits(&table, true), fits);
-                assert_eq!(together(std::slice::from_ref(&one), &table, true), fits);
+                assert_eq!(one.fits(&table), fits);
+                assert_eq!(one.surely_fits(&table), fits);
+                assert_eq!(together(std::slice::from_ref(&one), &table), fits);
             }
         }
     }
@@ -358,14 +354,13 @@ mod tests {
                 let one = any_one(table.len());
                 (Just(table), prop::collection::vec(one, 1..4))
             }),
-            flush in any::<bool>(),
         ) {
-            let fits = |one: &One| one.fits(&table, flush);
-            if together(&all, &table, flush) {
+            let fits = |one: &One| one.fits(&table);
+            if together(&all, &table) {
                 prop_assert!(all.iter().all(fits));
             }
             for one in &all {
-                if one.surely_fits(&table, flush) {
+                if one.surely_fits(&table) {
                     prop_assert!(fits(one));
                 }
             }

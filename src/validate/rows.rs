@@ -17,8 +17,6 @@ pub(crate) const LONGEST_ARM: f32 = 43_000.0;
 /// 65504 less 2 % for the roundings on the way: the limit of inverse effective masses, of their
 /// reciprocals, and of the sum of the contact points.
 pub(crate) const LARGEST: f32 = 64_000.0;
-/// 2^14 less 2 %, where subnormal numbers are flushed: 2^-14 is the smallest reciprocal left.
-const LARGEST_FLUSHED: f32 = 16_000.0;
 /// The relative error of a coordinate on its way: truncated once, or rounded twice.
 pub(crate) const LOSS: f32 = 1.0 / 1024.0;
 
@@ -39,14 +37,14 @@ impl Rows<'_> {
     // Not inlined: collisions whose rows are computed in f32 never reach it.
     #[inline(never)]
     pub(crate) fn check(&self, scene: &Scene<'_>) -> Result<(), InputError> {
-        if self.fit(scene.variant, scene.flush_subnormals) {
+        if self.fit(scene.variant) {
             return Ok(());
         }
         Err(self.refused(scene))
     }
 
     /// Whether every row stays in the range of a bitstream's arithmetic.
-    pub(crate) fn fit(&self, variant: &Variant, flush: bool) -> bool {
+    pub(crate) fn fit(&self, variant: &Variant) -> bool {
         if variant.numbers.rows == Precision::F32 {
             return true;
         }
@@ -57,7 +55,7 @@ impl Rows<'_> {
             let arms = self.positions.map(|position| arm(contact.point, position));
             let [a, b] = arms;
             let short = a.iter().chain(&b).fold(true, |fit, arm| fit & (*arm <= LONGEST_ARM));
-            fit &= short & (self.inverse_effective_mass(arms) <= largest(flush));
+            fit &= short & (self.inverse_effective_mass(arms) <= LARGEST);
         }
         sum.into_iter().fold(fit, |fit, sum| fit & (sum <= LARGEST))
     }
@@ -77,7 +75,7 @@ impl Rows<'_> {
     }
 
     /// Every number that has a limit, in the order of the record.
-    fn numbers(&self, flush: bool) -> Vec<Found> {
+    fn numbers(&self) -> Vec<Found> {
         let points: Vec<_> = used(self.collision).iter().map(|contact| contact.point).collect();
         let smallest = 1.0 / LARGEST;
         let mass = self.inverse_mass();
@@ -93,7 +91,7 @@ impl Rows<'_> {
             }
             let found = self.inverse_effective_mass(arms);
             let name = "inverse effective mass";
-            numbers.push((Some(contact), name, 0, found, smallest, largest(flush)));
+            numbers.push((Some(contact), name, 0, found, smallest, LARGEST));
         }
         for (component, found) in points.into_iter().fold([0.0; 3], add).into_iter().enumerate() {
             numbers.push((None, "sum of the contact points", component, found, 0.0, LARGEST));
@@ -104,10 +102,9 @@ impl Rows<'_> {
     /// Names the number that is out of range.
     #[cold]
     fn refused(&self, scene: &Scene<'_>) -> InputError {
-        let flush = scene.flush_subnormals;
         let (smallest, largest) = (1.0 / LARGEST, f32::INFINITY);
         let (contact, field, component, found, smallest, largest) = self
-            .numbers(flush)
+            .numbers()
             .into_iter()
             .find(|(.., found, smallest, largest)| !(smallest..=largest).contains(&found))
             .unwrap_or((
@@ -123,14 +120,9 @@ impl Rows<'_> {
         let (item, largest) = (InputItem::Rows(self.index, contact), largest.min(format.largest()));
         let number = OutOfRange { item, field, component, found, format, smallest, largest };
         scene.needs.refuse(Excess::OutOfRange(number), |variant| {
-            fits(variant, self.collision, self.positions) && self.fit(variant, flush)
+            fits(variant, self.collision, self.positions) && self.fit(variant)
         })
     }
-}
-
-/// The largest inverse effective mass whose reciprocal is not 0, 1/kg.
-pub(crate) const fn largest(flush: bool) -> f32 {
-    if flush { LARGEST_FLUSHED } else { LARGEST }
 }
 
 /// The largest magnitude of each component of a lever arm, over all roundings of its two ends.
@@ -170,19 +162,18 @@ mod tests {
 
     fn check_on(
         variant: Variant,
-        flush_subnormals: bool,
         shapes: [&Shape; 2],
         collision: &Collision,
         positions: [[f32; 3]; 2],
     ) -> Result<(), String> {
         let rows = Rows { index: 7, collision, positions, shapes };
-        rows.check(&scene_on(&variant, flush_subnormals)).map_err(|error| error.to_string())
+        rows.check(&scene_on(&variant)).map_err(|error| error.to_string())
     }
 
     const HALF_BUILT: Variant = HALF.default_variant();
 
     fn check(shapes: [&Shape; 2], point: [f32; 3]) -> Result<(), String> {
-        check_on(HALF_BUILT, false, shapes, &collision(point), [[0.0; 3]; 2])
+        check_on(HALF_BUILT, shapes, &collision(point), [[0.0; 3]; 2])
     }
 
     #[test]
@@ -200,7 +191,7 @@ mod tests {
         let flat = Shape { inverse_inertia: [0.1, 0.1, 1.5], ..Shape::isotropic(1.0, 0.0) };
         assert!(check([&GROUND, &flat], [0.0, 210.0, 0.0]).is_err());
         let (far, float) = (collision([0.0, 210.0, 0.0]), FLOAT.default_variant());
-        assert_eq!(check_on(float, true, [&GROUND, &CUBE], &far, [[0.0; 3]; 2]), Ok(()));
+        assert_eq!(check_on(float, [&GROUND, &CUBE], &far, [[0.0; 3]; 2]), Ok(()));
     }
 
     /// At 16 km, rounding of both ends may turn a lever arm of 1 m into 32 m.
@@ -210,23 +201,10 @@ mod tests {
         let check = |variant| {
             let contact = Contact { point: [16_001.0, 0.0, 0.0], distance: 0.0 };
             let near = Collision { contacts: [contact; 4], count: 1, ..collision([0.0; 3]) };
-            check_on(variant, false, [&light; 2], &near, [[16_000.0, 0.0, 0.0]; 2])
+            check_on(variant, [&light; 2], &near, [[16_000.0, 0.0, 0.0]; 2])
         };
         assert!(check(HALF_BUILT).is_err());
         assert_eq!(check(FLOAT.default_variant()), Ok(()));
-    }
-
-    #[test]
-    fn flushed_subnormals_bound_the_reciprocal() {
-        let check = |flush, point| {
-            let shapes = [&GROUND, &CUBE];
-            check_on(HALF_BUILT, flush, shapes, &collision(point), [[0.0; 3]; 2])
-        };
-        let far = [105.0, 0.0, 0.0];
-        assert_eq!(check(false, far), Ok(()));
-        let text = check(true, far).expect_err("1 / 16538 is subnormal");
-        assert!(text.contains("to 16000"), "{text}");
-        assert_eq!(check(true, [100.0, 0.0, 0.0]), Ok(()));
     }
 
     #[test]
@@ -245,7 +223,7 @@ mod tests {
         let point_mass = Shape::isotropic(1.0, 0.0);
         let check = |positions| {
             let near = collision([1.0, 0.0, 0.0]);
-            check_on(HALF_BUILT, false, [&GROUND, &point_mass], &near, positions)
+            check_on(HALF_BUILT, [&GROUND, &point_mass], &near, positions)
         };
         assert_eq!(check([[0.0, 0.0, 42_000.0], [0.0; 3]]), Ok(()));
         let text = check([[0.0, 0.0, -43_000.0], [0.0; 3]]).expect_err("too long");
@@ -263,7 +241,7 @@ mod tests {
             let there = [x, 0.0, 0.0];
             let contact = Contact { point: there, distance: 0.0 };
             let collision = Collision { count: 4, contacts: [contact; 4], ..collision(there) };
-            check_on(HALF_BUILT, false, [&GROUND, &point_mass], &collision, [there; 2])
+            check_on(HALF_BUILT, [&GROUND, &point_mass], &collision, [there; 2])
         };
         assert_eq!(check(16_000.0), Ok(()));
         let text = check(-16_100.0).expect_err("64,400");

@@ -3,7 +3,7 @@
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Inertia, Variant};
 
-use super::range::{computes_short, smallest_short};
+use super::range::{SMALLEST_SHORT, computes_short};
 use super::{Excess, InputError, InputItem, Limits, OutOfRange, SceneNeeds, exceeds};
 use crate::scene::Shape;
 
@@ -33,7 +33,7 @@ pub(crate) fn check_shapes(
             limit: limits.shape_capacity,
         });
     }
-    // A bitstream that flushes subnormal numbers takes a subnormal inverse mass for 0: the body
+    // `float` flushes subnormal numbers and takes a subnormal inverse mass for 0: the body
     // would be static there, and moving in the driver.
     let usable = |value: f32| value == 0.0 || (value > 0.0 && value.is_normal());
     for (index, shape) in shapes.iter().enumerate() {
@@ -53,7 +53,7 @@ pub(crate) fn check_shapes(
             let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
             return Err(needs.refuse(excess, |_| true));
         }
-        let smallest = smallest_short(limits.flush_subnormals);
+        let smallest = SMALLEST_SHORT;
         let beyond = |field: &'static str, found: f32, variant: &Variant| {
             let format = held(field, variant);
             let fits = match format {
@@ -199,17 +199,13 @@ mod tests {
              5.9604645e-8 to 65504: give another shape, or load another bitstream (profiles that \
              could: naive, float)"
         );
-        // 20 t: binary16 holds it as a subnormal number, unless these count as 0.
+        // 20 t: binary16 holds it as a subnormal number.
         let heavy = Shape::isotropic(5e-5, 0.1);
         assert_eq!(validate_shapes(&[heavy], &HALF), Ok(()));
-        let flush = Limits { flush_subnormals: true, ..HALF };
-        let text = out_of_range(heavy, &flush);
-        assert!(text.contains("inverse mass[0] is 5e-5") && text.contains("from 6.1035"), "{text}");
         assert!(
             out_of_range(Shape::isotropic(1e-8, 0.1), &HALF).contains("inverse mass[0] is 1e-8")
         );
-        let flush = Limits { flush_subnormals: true, ..FLOAT };
-        assert_eq!(validate_shapes(&[heavy, Shape::isotropic(1e-30, 1e30)], &flush), Ok(()));
+        assert_eq!(validate_shapes(&[heavy, Shape::isotropic(1e-30, 1e30)], &FLOAT), Ok(()));
     }
 
     #[test]

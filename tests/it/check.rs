@@ -176,7 +176,6 @@ fn boards_of_other_builds_pass_too() {
         BoardConfig { address_width: 64, ..BoardConfig::default() },
         BoardConfig {
             hazards: bitstream_model::Hazards::Unchecked,
-            subnormals: bitstream_model::Subnormals::Flush,
             bandwidth: bitstream_model::Bandwidth::Unlimited,
             ..BoardConfig::default()
         },
@@ -200,14 +199,7 @@ fn boards_of_every_profile_pass_every_line() {
             configs.push(BoardConfig { profile, inertia, ..BoardConfig::default() });
         }
     }
-    configs.extend([
-        BoardConfig { numbers: Some(short), ..BoardConfig::default() },
-        BoardConfig {
-            profile: &HALF,
-            subnormals: bitstream_model::Subnormals::Flush,
-            ..BoardConfig::default()
-        },
-    ]);
+    configs.extend([BoardConfig { numbers: Some(short), ..BoardConfig::default() }]);
     for config in configs {
         let (report, _) = checked(config);
         assert!(report.passed(), "{report:#?}");

@@ -203,7 +203,6 @@ fn control_fields_follow_the_hls_convention_and_the_specification() {
     assert_eq!(control::flags::IMPULSES_OUT.mask(), 1 << 4);
     assert_eq!(control::flags::STREAMED_MASSES.mask(), 1 << 5);
     assert_eq!(control::features::INTERLOCKED.mask(), 1 << 0);
-    assert_eq!(control::features::FLUSH_SUBNORMALS.mask(), 1 << 2);
     assert_eq!(control::features::WORLD_INERTIA.mask(), 1 << 1);
     let formats = [
         control::numbers::COLLISIONS,

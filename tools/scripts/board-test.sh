@@ -28,8 +28,8 @@ cd "$repository"
 host=$target_root/release
 work=$target_root/kernel-test
 if [ $accelerator = rtl ]; then
-	# A step takes the simulator seconds. The Verilog has no subnormal numbers.
-	golden=(two_cubes pile5_step60) steps=${STEPS:-3} subnormals=flush
+	# A step takes the simulator seconds.
+	golden=(two_cubes pile5_step60) steps=${STEPS:-3}
 	if [ -z "${SIMULATOR:-}" ]; then
 		need_packages verilator g++ make
 		attend cargo run --quiet --release --locked -p rtlgen -- simulator --out "$work/rtl"
@@ -38,14 +38,13 @@ if [ $accelerator = rtl ]; then
 	export SIMULATOR
 else
 	mapfile -t golden < <(cd tests/golden && printf '%s\n' */)
-	steps=${STEPS:-120} subnormals=keep
+	steps=${STEPS:-120}
 	unset SIMULATOR
 fi
 
 attend cargo build --quiet --release --locked -p pgs -p guest-board
 # The expected digest is the model's, whatever the accelerator.
-digest=$("$host/pgs" run --board emulated --accelerator model --grid 5x5x5 --steps "$steps" \
-	--subnormals $subnormals |
+digest=$("$host/pgs" run --board emulated --accelerator model --grid 5x5x5 --steps "$steps" |
 	sed -n 's/^digest  *fnv1a-64 \([0-9a-f]\{16\}\)$/\1/p')
 [ -n "$digest" ] || fail "the run on this machine gave no digest"
 
@@ -61,7 +60,6 @@ done
 for folder in "${golden[@]}"; do cp -r "tests/golden/${folder%/}" "$content/golden/"; done
 echo "$digest" > "$content/expected/digest"
 echo "$steps" > "$content/expected/steps"
-echo $subnormals > "$content/expected/subnormals"
 echo "${BOOT_LIMIT:-1200}" > "$content/limit"
 
 CHECKS=$guest/board/checks attend "$scripts/kernel/initrd.sh" "$work/$kernel" "$content" \

@@ -60,8 +60,8 @@ recorded=(tests/golden/*/)
 simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
 if [ "$mode" = steps ]; then
 	if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile*/); fi
-	attend "$built/pgs" check --board emulated --subnormals flush --accelerator "rtl:${simulators[0]}"
-	attend "$built/pgs" check --board emulated --subnormals flush --inertia world --accelerator "rtl:$world"
+	attend "$built/pgs" check --board emulated --accelerator "rtl:${simulators[0]}"
+	attend "$built/pgs" check --board emulated --inertia world --accelerator "rtl:$world"
 	attend "$built/pgs" faults --accelerator "rtl:${simulators[0]}"
 	for build in interlocked world; do
 		cosim=(--simulator "$folder/$build/pgs-rtl")
@@ -101,11 +101,11 @@ attend "$built/cosim" random "${cosim[@]}" --cases $((cases / 10)) --seed 100000
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
 	--gaps 300 --stalls 700
 attend "$built/cosim" full --simulator "$folder/interlocked/pgs-rtl" --gaps 300 --stalls 700
-attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated --subnormals flush \
+attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated \
 	--accelerator "both:${simulators[0]}"
 # Impulses of each step come out, and go into the next one.
-attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated --subnormals flush \
+attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated \
 	--accelerator "both:${simulators[0]}"
 # Boxes, capsules, cylinders and hulls, with the masses of the shape table.
-attend "$built/pgs" run --scene shapes --grid 5x5x5 --drop 0 --steps 20 --board emulated --subnormals flush \
+attend "$built/pgs" run --scene shapes --grid 5x5x5 --drop 0 --steps 20 --board emulated \
 	--accelerator "both:$world"

@@ -83,8 +83,6 @@ pub mod features {
     pub const INTERLOCKED: Field = Field::bit("interlocked", 0, Access::ReadOnly);
     /// Velocity records carry the world inverse inertia of their body.
     pub const WORLD_INERTIA: Field = Field::bit("world_inertia", 1, Access::ReadOnly);
-    /// Subnormal operands and results count as zero.
-    pub const FLUSH_SUBNORMALS: Field = Field::bit("flush_subnormals", 2, Access::ReadOnly);
 }
 
 /// Fields of NUMBERS: a [`StreamFormat`](super::number::StreamFormat) each for the streams, a
@@ -290,11 +288,8 @@ pub const VERSION: Register = row(
 /// Identifier of the [`Profile`](super::profile::Profile).
 pub const PROFILE: Register = read_only("PROFILE", 0x108, &[]);
 /// Optional abilities.
-pub const FEATURES: Register = read_only(
-    "FEATURES",
-    0x10C,
-    &[features::INTERLOCKED, features::WORLD_INERTIA, features::FLUSH_SUBNORMALS],
-);
+pub const FEATURES: Register =
+    read_only("FEATURES", 0x10C, &[features::INTERLOCKED, features::WORLD_INERTIA]);
 /// Numbers of streams.
 pub const CHANNELS: Register = read_only("CHANNELS", 0x110, &[channels::MM2S, channels::S2MM]);
 /// Widths of the MM2S streams: for stream k bits 4k+3:4k hold log2(width / 8 bits).

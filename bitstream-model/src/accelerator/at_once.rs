@@ -3,11 +3,10 @@
 
 use super::Accelerator;
 use super::arithmetic::inertia::{Inertia, Isotropic, World};
-use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
+use super::arithmetic::number::{Format, Half, Single, SingleFlushed};
 use super::hazards::Entry;
 use super::records::decode::Collision;
 use super::records::segment::{Beats, Reader};
-use crate::config::Subnormals;
 use pgs_interface::number::Precision;
 use pgs_interface::profile;
 use pgs_interface::record::CONTACT_POINTS;
@@ -51,19 +50,20 @@ impl Accelerator {
 
     /// Computes a pass over all its collisions, which are right.
     pub(crate) fn compute_pass(&mut self, pass: u32, collisions: &[Collision]) {
-        match self.config.subnormals {
-            Subnormals::Keep => self.compute_of::<Single, Half>(pass, collisions),
-            Subnormals::Flush => self.compute_of::<SingleFlushed, HalfFlushed>(pass, collisions),
+        if self.config.profile.flushes_subnormals {
+            self.compute_of::<SingleFlushed>(pass, collisions);
+        } else {
+            self.compute_of::<Single>(pass, collisions);
         }
     }
 
-    fn compute_of<S: Format, H: Format>(&mut self, pass: u32, collisions: &[Collision]) {
+    fn compute_of<S: Format>(&mut self, pass: u32, collisions: &[Collision]) {
         match (self.variant.numbers.updates, self.variant.inertia) {
             (Precision::Binary16, profile::Inertia::Isotropic) => {
-                self.compute_with::<H, Isotropic>(pass, collisions);
+                self.compute_with::<Half, Isotropic>(pass, collisions);
             }
             (Precision::Binary16, profile::Inertia::World) => {
-                self.compute_with::<H, World>(pass, collisions);
+                self.compute_with::<Half, World>(pass, collisions);
             }
             (Precision::F32, profile::Inertia::Isotropic) => {
                 self.compute_with::<S, Isotropic>(pass, collisions);

@@ -1,7 +1,7 @@
 //! Registers of the control block, and the effects of reads and writes.
 
 use crate::cast::{high, low, register};
-use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::config::{BoardConfig, Hazards};
 use pgs_interface::control::{
     ANGULAR_DAMPING, AP_CTRL, BODIES, BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY,
     COLLISIONS, CONTACT_DEPTH, CONTACT_ITERATIONS, COUNTER_MAX, CYCLES_HI, CYCLES_LO, DMA, ERROR,
@@ -311,8 +311,6 @@ impl Registers {
             _ if offset == PROFILE.offset => profile.id,
             _ if offset == FEATURES.offset => {
                 features::INTERLOCKED.put(0, u32::from(config.hazards == Hazards::Interlocked))
-                    | features::FLUSH_SUBNORMALS
-                        .put(0, u32::from(config.subnormals == Subnormals::Flush))
                     | features::WORLD_INERTIA.put(0, u32::from(config.inertia == Inertia::World))
             }
             _ if offset == CHANNELS.offset => {

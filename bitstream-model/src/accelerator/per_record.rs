@@ -2,7 +2,7 @@
 
 use super::Accelerator;
 use super::arithmetic::inertia;
-use super::arithmetic::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
+use super::arithmetic::number::{Format, Half, Number, Single, SingleFlushed};
 use super::integrate::integrate;
 use super::records::array::Row;
 use super::records::decode::{self, Collision};
@@ -10,7 +10,6 @@ use super::records::segment::{Beats, PacketError, Reader};
 use super::solver::{self, Impulses, Mass};
 use super::state::{Pose, Velocity};
 use crate::cast::register;
-use crate::config::Subnormals;
 use pgs_interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Inertia;
@@ -44,14 +43,10 @@ impl Accelerator {
     /// Numbers as an on-chip array of that precision holds them.
     #[inline]
     fn stored<const N: usize>(&self, precision: Precision, numbers: [f32; N]) -> [f32; N] {
-        fn rounded<F: Format, const N: usize>(numbers: [f32; N]) -> [f32; N] {
-            numbers.map(|number| Number::<F>::new(number).value())
-        }
-        match (precision, self.config.subnormals) {
+        match precision {
             // The array holds the arithmetic's results unchanged.
-            (Precision::F32, _) => numbers,
-            (Precision::Binary16, Subnormals::Keep) => rounded::<Half, N>(numbers),
-            (Precision::Binary16, Subnormals::Flush) => rounded::<HalfFlushed, N>(numbers),
+            Precision::F32 => numbers,
+            Precision::Binary16 => numbers.map(|number| Number::<Half>::new(number).value()),
         }
     }
 
@@ -197,11 +192,10 @@ impl Accelerator {
             StreamFormat::F32 => Precision::F32,
             StreamFormat::Binary16 => numbers.updates,
         };
-        let step = match (precision, self.config.subnormals) {
-            (Precision::F32, Subnormals::Keep) => integrate::<Single>,
-            (Precision::F32, Subnormals::Flush) => integrate::<SingleFlushed>,
-            (Precision::Binary16, Subnormals::Keep) => integrate::<Half>,
-            (Precision::Binary16, Subnormals::Flush) => integrate::<HalfFlushed>,
+        let step = match precision {
+            Precision::F32 if self.config.profile.flushes_subnormals => integrate::<SingleFlushed>,
+            Precision::F32 => integrate::<Single>,
+            Precision::Binary16 => integrate::<Half>,
         };
         if free {
             step(&self.arguments.integration, &pose, &velocity)
@@ -214,10 +208,8 @@ impl Accelerator {
     /// Whether a velocity is not 0.
     fn is_under_way(&self, velocity: &Velocity) -> bool {
         let numbers = [velocity.linear, velocity.angular];
-        let zero = match self.config.subnormals {
-            Subnormals::Keep => |number: f32| number == 0.0,
-            Subnormals::Flush => |number: f32| number.abs() < f32::MIN_POSITIVE,
-        };
-        !numbers.as_flattened().iter().all(|number| zero(*number))
+        let flushes = self.config.profile.flushes_subnormals;
+        let zero = |number: &f32| *number == 0.0 || flushes && number.is_subnormal();
+        !numbers.as_flattened().iter().all(zero)
     }
 }

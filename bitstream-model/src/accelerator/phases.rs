@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::arithmetic::inertia::{self, Isotropic, World};
-use super::arithmetic::number::{Format, Half, HalfFlushed, Single, SingleFlushed};
+use super::arithmetic::number::{Format, Half, Single, SingleFlushed};
 use super::hazards::Entry;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
@@ -12,7 +12,7 @@ use super::records::segment::{Beats, PacketError, Reader, Segment};
 use super::records::striping::Striping;
 use super::{Accelerator, Phase};
 use crate::cast::register;
-use crate::config::{Hazards, Subnormals};
+use crate::config::Hazards;
 use crate::stream::Stream;
 use pgs_interface::control::ErrorCode;
 use pgs_interface::number::{Precision, StreamFormat};
@@ -208,18 +208,19 @@ impl Accelerator {
     /// Solves collisions that have arrived, for up to `limit` cycles; returns the cycles that they
     /// take to enter, stalls included.
     fn solve_arrived(&mut self, input: PassInput<'_>) -> Result<u64, PacketError> {
-        match self.config.subnormals {
-            Subnormals::Keep => self.solve_of::<Single, Half>(input),
-            Subnormals::Flush => self.solve_of::<SingleFlushed, HalfFlushed>(input),
+        if self.config.profile.flushes_subnormals {
+            self.solve_of::<SingleFlushed>(input)
+        } else {
+            self.solve_of::<Single>(input)
         }
     }
 
-    fn solve_of<S: Format, H: Format>(&mut self, input: PassInput<'_>) -> Result<u64, PacketError> {
+    fn solve_of<S: Format>(&mut self, input: PassInput<'_>) -> Result<u64, PacketError> {
         let numbers = self.variant.numbers;
         match (numbers.updates, numbers.rows) {
             // Rows that need more than the updates have: the configuration refuses them.
-            (Precision::Binary16, _) => self.solve_with::<H, H>(input),
-            (Precision::F32, Precision::Binary16) => self.solve_with::<H, S>(input),
+            (Precision::Binary16, _) => self.solve_with::<Half, Half>(input),
+            (Precision::F32, Precision::Binary16) => self.solve_with::<Half, S>(input),
             (Precision::F32, Precision::F32) => self.solve_with::<S, S>(input),
         }
     }

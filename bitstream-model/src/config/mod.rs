@@ -35,16 +35,6 @@ pub enum Hazards {
     Unchecked,
 }
 
-/// The treatment of subnormal numbers in the arithmetic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Subnormals {
-    /// IEEE 754.
-    Keep,
-    /// Subnormal operands count as zero and results that are subnormal after rounding become zero,
-    /// with their sign, as in the vendor's floating-point operators.
-    Flush,
-}
-
 /// Bandwidth of the memory, shared by all streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bandwidth {
@@ -121,8 +111,6 @@ pub struct BoardConfig {
     pub hazards: Hazards,
     /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
     pub window_slots: Option<u32>,
-    /// Arithmetic on subnormal numbers.
-    pub subnormals: Subnormals,
     /// Memory bandwidth.
     pub bandwidth: Bandwidth,
     /// Width of the DMA length registers, 8 to 26 bits.
@@ -159,7 +147,6 @@ impl Default for BoardConfig {
             inertia: Inertia::Isotropic,
             hazards: Hazards::Interlocked,
             window_slots: None,
-            subnormals: Subnormals::Keep,
             bandwidth: Bandwidth::ZCU102_SUSTAINED,
             length_width: LENGTH_WIDTH_MAX,
             address_width: 40,

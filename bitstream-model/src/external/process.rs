@@ -30,7 +30,7 @@ use std::time::{Duration, Instant};
 use pgs_support::Process;
 
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
-use crate::config::{BoardConfig, Hazards, Subnormals};
+use crate::config::{BoardConfig, Hazards};
 use pgs_interface::control::{
     FEATURES, FENCE_BASE, FENCE_SIZE, IDENTIFICATION, IDENTIFICATION_VALUE, features,
 };
@@ -80,7 +80,7 @@ impl SimulatorProcess {
     }
 
     /// Starts a simulator as the accelerator of a board that is built as `config` says. The board
-    /// treats subnormal numbers as the simulator does, has the fence that it reports.
+    /// has the fence that the simulator reports.
     ///
     /// # Errors
     /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`]
@@ -104,10 +104,6 @@ impl SimulatorProcess {
             let name = |world| if world { "world" } else { "isotropic" };
             return Err(ExternalError::Inertia { simulator: name(world), board: name(!world) });
         }
-        config.subnormals = match features::FLUSH_SUBNORMALS.is_set(features) {
-            true => Subnormals::Flush,
-            false => Subnormals::Keep,
-        };
         let fence = [simulator.read(FENCE_BASE.offset)?, simulator.read(FENCE_SIZE.offset)?];
         config.fence = Fence::from_registers(fence).unwrap_or_default();
         Ok(simulator)

@@ -16,7 +16,7 @@ use crate::accelerator::records::decode::Collision;
 use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
 use crate::arbiter::Arbiter;
 use crate::axi_dma::{Core, Surroundings};
-use crate::config::{BoardConfig, Hazards, Subnormals, THREADS_MAX, beat_cycles};
+use crate::config::{BoardConfig, Hazards, THREADS_MAX, beat_cycles};
 use crate::memory::Memory;
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
@@ -106,10 +106,9 @@ impl Fast {
     /// The fast way of a board, unless it is switched off or its design has none.
     pub(crate) fn of(config: &BoardConfig) -> Option<Self> {
         let (variant, profile) = (config.variant(), config.profile);
-        let exact = config.subnormals == Subnormals::Keep || variant.numbers == Numbers::F32;
         let known = [Numbers::F32, Numbers::BINARY16].contains(&variant.numbers)
             && config.hazards == Hazards::Interlocked;
-        if !(config.fast && known && exact) {
+        if !(config.fast && known) {
             return None;
         }
         let crew = Crew::new("board", config.threads.clamp(1, THREADS_MAX) - 1);
@@ -190,7 +189,7 @@ impl Fast {
             contact: arguments.contact_passes(),
             warm: arguments.warm_start,
             damping: arguments.solver.spin_damping,
-            watches: self.config.subnormals == Subnormals::Flush,
+            watches: self.config.profile.flushes_subnormals,
         };
         for (results, beats) in self.results.iter_mut().zip(outgoing) {
             results.clear();

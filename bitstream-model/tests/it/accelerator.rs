@@ -1,9 +1,9 @@
 //! The accelerator behind its streams and registers: results, refusals, counters.
 
-use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, Subnormals, ViolationKind};
+use bitstream_model::{Bandwidth, BoardConfig, Direction, Hazards, ViolationKind};
 use pgs_interface::axi_dma::dmasr;
 use pgs_interface::control::{self, ErrorCode, ap_ctrl, irq};
-use pgs_interface::profile::FLOAT;
+use pgs_interface::profile::{FLOAT, NAIVE};
 use pgs_interface::record::Beat;
 use pgs_interface::register::Register;
 
@@ -23,9 +23,9 @@ fn machine() -> Machine {
 #[test]
 fn one_cube_on_the_ground_ends_in_bullets_bits() {
     for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
-        for subnormals in [Subnormals::Keep, Subnormals::Flush] {
+        for profile in [&FLOAT, &NAIVE] {
             let mut machine =
-                Machine::new(BoardConfig { hazards, subnormals, ..BoardConfig::default() });
+                Machine::new(BoardConfig { hazards, profile, ..BoardConfig::default() });
             let outcome = machine.step(&one_cube()).expect("the step completes");
             let cube = bits(&outcome.bodies[1]);
             assert_eq!(cube[0], [0x3E7F_E9BD, 0x3F7E_B865, 0xBF00_04AA, 0]);
@@ -568,17 +568,14 @@ fn unchecked_is_right_when_the_collisions_stand_a_window_apart() {
 }
 
 #[test]
-fn flushed_subnormals_change_a_step_and_the_capability_says_so() {
+fn only_float_flushes_subnormals() {
     let tiny = f32::from_bits(0x0000_1000);
     let mut scene = Step::falling(1);
     scene.bodies[0].linear = [tiny, 0.0, 0.0];
-    for (subnormals, expected) in [(Subnormals::Keep, tiny), (Subnormals::Flush, 0.0)] {
-        let mut machine = Machine::new(BoardConfig { subnormals, ..BoardConfig::default() });
+    for (profile, expected) in [(&NAIVE, tiny), (&FLOAT, 0.0)] {
+        let mut machine = Machine::new(BoardConfig { profile, ..BoardConfig::default() });
         let outcome = machine.step(&scene).expect("the step completes");
         assert_eq!(outcome.bodies[0].linear[0].to_bits(), expected.to_bits());
-        let features = machine.host.control(control::FEATURES);
-        let flush = control::features::FLUSH_SUBNORMALS.is_set(features);
-        assert_eq!(flush, subnormals == Subnormals::Flush);
     }
 }
 

@@ -3,8 +3,8 @@
 
 use std::cell::Cell;
 
-use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan, Subnormals};
-use pgs_interface::profile::{FLOAT, Inertia, Profile};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, FaultPlan};
+use pgs_interface::profile::{FLOAT, Inertia, NAIVE, Profile};
 use proptest::prelude::*;
 
 use crate::common::fast::{PROFILES, SLOTS, Tolerance, below, extended, same, scene};
@@ -245,7 +245,7 @@ fn falling(speed: f32, integrate: bool) -> Step {
 #[test]
 fn a_subnormal_number_has_the_step_taken_by_the_reference_on_a_board_that_flushes() {
     let smallest = f32::MIN_POSITIVE;
-    let flushes = BoardConfig { subnormals: Subnormals::Flush, ..board(&FLOAT, 512) };
+    let flushes = board(&FLOAT, 512);
     for (what, speed, drift, subnormal) in [
         ("none", 1.0, 0.0, false),
         ("an operand", smallest / 2.0, 0.0, true),
@@ -268,7 +268,7 @@ fn a_subnormal_number_has_the_step_taken_by_the_reference_on_a_board_that_flushe
             let expected = if subnormal { [0, 2] } else { [2, 0] };
             assert_eq!(found, expected, "{what} {integrate}");
             // A board that keeps them takes the step at once.
-            let keeps = BoardConfig { subnormals: Subnormals::Keep, ..flushes };
+            let keeps = board(&NAIVE, 512);
             let found = counted(|| {
                 same(keeps, 1, tolerance(&keeps, 10), |machine| machine.step(&step));
             });

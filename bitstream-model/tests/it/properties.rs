@@ -1,9 +1,7 @@
 //! No program on the registers and the descriptors makes the board panic or hang, and a reset makes
 //! it work again.
 
-use bitstream_model::{
-    Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards, Subnormals,
-};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, Direction, EmulatedBoard, Hazards};
 use pgs_interface::address_map::{CONTROL_BASE, dma_base};
 use pgs_interface::axi_dma::{ADDRESS, ADDRESS_MSB, CHANNEL_REGISTERS, DMACR, LENGTH};
 use pgs_interface::control::{self, ap_ctrl};
@@ -132,7 +130,7 @@ fn config() -> impl Strategy<Value = BoardConfig> {
     )
         .prop_map(
             |(variant, switches, length_width, address_width, bandwidth, window_slots)| {
-                let [direct, unchecked, flush, strict] = switches;
+                let [direct, unchecked, scattered, strict] = switches;
                 let Variant { profile, numbers, inertia } = variant;
                 BoardConfig {
                     profile,
@@ -140,12 +138,11 @@ fn config() -> impl Strategy<Value = BoardConfig> {
                     inertia,
                     hazards: if unchecked { Hazards::Unchecked } else { Hazards::Interlocked },
                     window_slots,
-                    subnormals: if flush { Subnormals::Flush } else { Subnormals::Keep },
                     bandwidth,
                     length_width,
                     address_width,
                     // Most boards with scatter-gather and lenient: the others see less.
-                    scatter_gather: !(direct && flush),
+                    scatter_gather: !direct || scattered,
                     strict: strict && unchecked,
                     ..BoardConfig::default()
                 }

@@ -15,15 +15,11 @@ use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, StepParame
 use crate::validate::InputError;
 use crate::validate::{Limits, Quick, preflight, validate};
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Variant};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE, PROFILES, Variant};
 use pgs_interface::record::Beat;
 
-const SHAPES: [Shape; 4] = [
-    Shape::STATIC,
-    Shape::isotropic(1.0, 1.5),
-    Shape::isotropic(0.5, 100.0),
-    Shape::isotropic(1e-5, 0.0),
-];
+const SHAPES: [Shape; 3] =
+    [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(0.5, 100.0)];
 pub(crate) const BODIES: usize = 40;
 
 /// The pose of a body.
@@ -39,18 +35,6 @@ const CONTACT: Contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
 /// A collision of two such bodies. It is right if both may move.
 const COLLISION: Collision =
     Collision { body_a: 3, body_b: 4, normal: [0.0, 1.0, 0.0], count: 3, contacts: [CONTACT; 4] };
-
-/// The shapes that a bitstream takes. Only world inertia without flushing takes the last one: it is
-/// too heavy for a bitstream that flushes subnormals. With it in the table, 16-bit rows need a
-/// check of each collision.
-fn shapes(limits: &Limits) -> &'static [Shape] {
-    let light = limits.flush_subnormals || limits.variant.inertia == Inertia::Isotropic;
-    if light { &SHAPES[..3] } else { &SHAPES }
-}
-
-pub(crate) fn limits(variant: Variant, flush_subnormals: bool) -> Limits {
-    Limits { flush_subnormals, ..Limits::roomy(variant) }
-}
 
 /// Buffers for `records` records.
 fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
@@ -117,7 +101,7 @@ fn said_and_doubted(
     collisions: &Vec<Collision>,
     schedule: Option<&Schedule>,
 ) -> Option<(Said, usize)> {
-    let (parameters, shapes) = (StepParameters::default(), shapes(limits));
+    let (parameters, shapes) = (StepParameters::default(), &SHAPES);
     let scene = preflight(bodies, collisions, shapes, &parameters, limits).ok()?;
     let quick = Quick::new(scene);
     let variant = &limits.variant;
@@ -203,9 +187,7 @@ fn a_pile_is_found_good_at_once() {
                     for (schedule, collisions) in
                         ordered.into_iter().flat_map(|it| piles.iter().map(move |pile| (it, pile)))
                     {
-                        // These limits exclude the heaviest shape, with which a block never passes
-                        // at once.
-                        let limits = limits(variant, true);
+                        let limits = Limits::roomy(variant);
                         let ((good, valid), doubted) =
                             said_and_doubted(&limits, &bodies, collisions, schedule)
                                 .expect("nothing else wrong");
@@ -242,7 +224,7 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     for (profile, collisions) in
         profiles.into_iter().flat_map(|of| piles.iter().map(move |it| (of, it)))
     {
-        let limits = limits(profile.default_variant(), true);
+        let limits = Limits::roomy(profile.default_variant());
         let said = |bodies: &Vec<Body>, collisions: &Vec<Collision>| {
             let (good, valid) =
                 said(&limits, bodies, collisions, None).expect("nothing else wrong");
@@ -283,7 +265,7 @@ fn what_is_wrong_beside_padding_is_noticed() {
         ("NaN", Collision { contacts: [CONTACT, CONTACT, nan, CONTACT], ..COLLISION }),
     ];
     for profile in PROFILES {
-        let limits = limits(profile.default_variant(), true);
+        let limits = Limits::roomy(profile.default_variant());
         let said_of = |wrong: Option<Collision>, at: usize, empty: &[usize]| {
             let mut collisions = [COLLISION, on_ground].repeat(CHECKED);
             if let Some(wrong) = wrong {
@@ -334,7 +316,7 @@ fn bodies_beyond_sixteen_bits_are_looked_at_by_all_their_bits() {
         contacts: [Contact::default(); 4],
     };
     for profile in [&NAIVE, &FLOAT] {
-        let limits = limits(profile.default_variant(), false);
+        let limits = Limits::roomy(profile.default_variant());
         // Two bodies are static, and all others move.
         for still in [[0, 1], [low, low + 1]] {
             let mut bodies = vec![body(1); low + 2];
@@ -361,7 +343,7 @@ fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
     let contact = |x| Contact { point: [x, 2.0, 3.0], distance: -0.01 };
     {
         let profile = &HALF;
-        let limits = limits(profile.default_variant(), true);
+        let limits = Limits::roomy(profile.default_variant());
         for (near, far) in [(2, 2), (1, 2), (2, 1), (0, 2), (2, 0)] {
             let bodies = vec![at(1.0, near), at(17.0, far)];
             for (body_a, count) in (0..8).map(|case| (case % 2, 1 + case / 2)) {

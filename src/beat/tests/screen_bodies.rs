@@ -1,6 +1,6 @@
 //! Compares the packer's checks of bodies, and of collisions with bodies far away, with validation.
 
-use super::screen::{BODY, limits, said};
+use super::screen::{BODY, said};
 use crate::scene::{Body, Collision, Contact};
 use crate::validate::InputError;
 use crate::validate::Limits;
@@ -9,7 +9,7 @@ use pgs_interface::profile::{HALF, PROFILES, Profile};
 
 /// Whether packing and validation accept these bodies in a profile, without collisions.
 fn said_of(profile: &'static Profile, bodies: &Vec<Body>) -> bool {
-    let limits = limits(profile.default_variant(), true);
+    let limits = Limits::roomy(profile.default_variant());
     let (good, valid) = said(&limits, bodies, &Vec::new(), None).expect("nothing else wrong");
     assert_eq!(good, valid.is_ok(), "{}: {valid:?}", profile.name);
     good
@@ -82,7 +82,7 @@ fn said_of_far(limits: &Limits, distance: f32, shape: u32) -> Vec<((bool, bool),
 #[test]
 fn a_static_body_that_is_too_far_is_noticed_whichever_it_is() {
     for (distance, right) in [(30_000.0, true), (-50_000.0, false), (50_000.0, false)] {
-        for (found, of) in said_of_far(&limits(HALF.default_variant(), true), distance, 0) {
+        for (found, of) in said_of_far(&Limits::roomy(HALF.default_variant()), distance, 0) {
             assert_eq!(found, (right, right), "{of}");
         }
     }
@@ -95,7 +95,7 @@ fn a_position_that_collisions_do_not_hold_is_noticed_whichever_body_it_is_of() {
     let mut variant = HALF.default_variant();
     variant.numbers = Numbers { poses: StreamFormat::F32, rows: Precision::F32, ..variant.numbers };
     for (distance, right) in [(60_000.0, true), (-70_000.0, false), (70_000.0, false)] {
-        for (found, of) in said_of_far(&limits(variant, true), distance, 1) {
+        for (found, of) in said_of_far(&Limits::roomy(variant), distance, 1) {
             assert_eq!(found, (right, right), "{of}");
         }
     }

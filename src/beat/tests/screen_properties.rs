@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::screen::{BODIES, limits, said};
+use super::screen::{BODIES, said};
 use crate::order::Schedule;
 use crate::scene::{Body, Collision, Contact, Pose, Velocity};
 use crate::validate::Limits;
@@ -17,9 +17,8 @@ fn any_limits() -> impl Strategy<Value = Limits> {
         prop::sample::select(profiles),
         prop::option::of((prop::sample::select(short_rows), prop::sample::select(formats))),
         any::<bool>(),
-        any::<bool>(),
     )
-        .prop_map(|(profile, other, world, flush)| {
+        .prop_map(|(profile, other, world)| {
             let mut variant = profile.default_variant();
             if let Some((rows, format)) = other {
                 let numbers = Numbers { rows, collisions: format, ..variant.numbers };
@@ -30,7 +29,7 @@ fn any_limits() -> impl Strategy<Value = Limits> {
             }
             let world = variant.profile.world.filter(|_| world);
             variant.inertia = world.map_or(Inertia::Isotropic, |_| Inertia::World);
-            limits(variant, flush)
+            Limits::roomy(variant)
         })
 }
 

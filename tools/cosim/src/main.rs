@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use bitstream_model::external::{
     ExternalAccelerator, ExternalError, LockStep, ModelAccelerator, SimulatorProcess, serve,
 };
-use bitstream_model::{BoardConfig, Hazards, Subnormals};
+use bitstream_model::{BoardConfig, Hazards};
 use clap::{Parser, Subcommand, ValueEnum};
 use cosim::accesses;
 use cosim::flaws::{Flawed, Flaws};
@@ -98,9 +98,8 @@ impl BuildArgs {
             HazardMode::Unchecked => Hazards::Unchecked,
         };
         let inertia = self.inertia.into();
-        let subnormals = Subnormals::Flush;
         let fence = Some(Parameters::with(inertia).memory);
-        BoardConfig { hazards, inertia, subnormals, fence, ..Default::default() }
+        BoardConfig { hazards, inertia, fence, ..Default::default() }
     }
 }
 

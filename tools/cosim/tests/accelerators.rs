@@ -9,7 +9,7 @@ use bitstream_model::external::{
     Difference, DifferencePlace, ExternalAccelerator, ExternalError, LockStep, ModelAccelerator,
     SimulatorProcess,
 };
-use bitstream_model::{BoardConfig, EmulatedBoard, Subnormals};
+use bitstream_model::{BoardConfig, EmulatedBoard};
 use cosim::flaws::{Flawed, Flaws};
 use cosim::packets::packets;
 use cosim::{accesses, outcome, random};
@@ -25,7 +25,7 @@ const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
 fn config() -> BoardConfig {
     let fence = Some(Fence::default());
-    BoardConfig { subnormals: Subnormals::Flush, fence, ..BoardConfig::default() }
+    BoardConfig { fence, ..BoardConfig::default() }
 }
 
 fn lock_step(inertia: Inertia, flaws: Flaws) -> LockStep {

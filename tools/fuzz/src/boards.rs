@@ -1,11 +1,11 @@
 //! Chooses how a board is built.
 
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards, Subnormals};
+use bitstream_model::{Bandwidth, BoardConfig, Delays, Hazards};
 
 use crate::input::Input;
 
-/// Every profile, with every option: formats, inertia, hazards, subnormals, bandwidth, widths,
+/// Every profile, with every option: formats, inertia, hazards, bandwidth, widths,
 /// depths, delays. Every combination is valid.
 pub fn any(input: &mut Input<'_>) -> BoardConfig {
     let Variant { profile, numbers, inertia } = variant(input);
@@ -19,7 +19,6 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
         hazards: if on(0) { Hazards::Unchecked } else { Hazards::Interlocked },
         // In the profiles' own windows, an order without hazards needs hundreds of empty entries.
         window_slots: if on(1) && on(4) { None } else { Some(1 + input.below(24)) },
-        subnormals: if on(2) { Subnormals::Flush } else { Subnormals::Keep },
         bandwidth: input.pick(&[
             Bandwidth::Unlimited,
             Bandwidth::ZCU102_SUSTAINED,

@@ -94,6 +94,10 @@ pub struct Profile {
     /// Fill of the integration, clock cycles: from the last body in to the end of the step, the
     /// control around the pipeline included. It is the same for every step.
     pub integration_fill: u32,
+    /// Whether arithmetic in f32 takes subnormal operands for zero, and makes results zero that are
+    /// subnormal after rounding, with their sign, as the generated Verilog does. Arithmetic in
+    /// binary16 keeps them.
+    pub flushes_subnormals: bool,
     /// Clock of accelerator and streams, kHz.
     pub clock_khz: u32,
     /// On-chip memory.

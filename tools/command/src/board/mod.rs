@@ -8,7 +8,7 @@ use std::sync::Once;
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards, Subnormals};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards};
 use serde_json::{Value, json};
 use zynq_pgs::board::BoardKind;
 use zynq_pgs::emulation::Build;
@@ -371,14 +371,13 @@ impl OpenBoard {
         let can = self.accelerator.capabilities();
         fact(out, "board", &format!("{} ({})", self.kind(), self.reason))?;
         let bitstream = format!(
-            "{}, {} MHz, {} + {} channels, initiation interval {}, {}, subnormals {}",
+            "{}, {} MHz, {} + {} channels, initiation interval {}, {}",
             self.design(),
             f64::from(can.clock_khz) / 1e3,
             can.mm2s_channels,
             can.s2mm_channels,
             can.initiation_interval,
             hazards_text(can.interlocked),
-            subnormals_text(can.flush_subnormals),
         );
         fact(out, "bitstream", &bitstream)?;
         let Some(config) = self.config() else { return Ok(()) };
@@ -404,7 +403,6 @@ impl OpenBoard {
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
             "interlocked": can.interlocked,
-            "flush_subnormals": can.flush_subnormals,
             "mm2s_channels": can.mm2s_channels,
             "s2mm_channels": can.s2mm_channels,
             "initiation_interval": can.initiation_interval,
@@ -422,7 +420,6 @@ impl OpenBoard {
                 "build": described(&config),
                 "hazards": hazards_text(config.hazards == Hazards::Interlocked),
                 "window_slots": config.window_slots,
-                "subnormals": subnormals_text(config.subnormals == Subnormals::Flush),
                 "bandwidth_bytes_per_second": bandwidth_number(config.bandwidth),
             })),
         })
@@ -436,8 +433,4 @@ impl OpenBoard {
 
 fn hazards_text(interlocked: bool) -> &'static str {
     if interlocked { "interlocked" } else { "unchecked" }
-}
-
-fn subnormals_text(flush: bool) -> &'static str {
-    if flush { "flush" } else { "keep" }
 }

@@ -3,7 +3,7 @@
 use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::number::{Numbers, Precision};
 use bitstream_model::interface::profile::{Inertia, Profile};
-use bitstream_model::{Bandwidth, BoardConfig, Hazards, Subnormals};
+use bitstream_model::{Bandwidth, BoardConfig, Hazards};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use zynq_pgs::emulation::{Build, BuildError};
@@ -29,9 +29,6 @@ pub struct BuildArgs {
     /// Hazard window in issue slots [default: the profile's]
     #[arg(long, value_name = "SLOTS", value_parser = number("window", |build| build.window))]
     window: Option<u32>,
-    /// Keep subnormal numbers or flush them to zero [default: keep]
-    #[arg(long, value_parser = choice("subnormals", |build| build.subnormals))]
-    subnormals: Option<Subnormals>,
     /// Memory bandwidth in GB/s, or "unlimited" [default: 12.8]
     #[arg(long, value_name = "GBPS", value_parser = number("bandwidth", |build| build.bandwidth))]
     bandwidth: Option<Bandwidth>,
@@ -73,7 +70,6 @@ impl BuildArgs {
             inertia: self.inertia,
             hazards: self.hazards,
             window: self.window,
-            subnormals: self.subnormals,
             bandwidth: self.bandwidth,
             length_width: self.length_width,
             address_width: self.address_width,
@@ -158,7 +154,7 @@ mod tests {
 
     #[test]
     fn each_option_of_the_command_line_is_that_of_a_text() {
-        let text = "half,f32,unchecked,window=9,flush,world,bandwidth=unlimited,\
+        let text = "half,f32,unchecked,window=9,world,bandwidth=unlimited,\
                     length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
         let expected: Build = text.parse().expect("a build");
         let options = Build::keys()
@@ -204,7 +200,7 @@ mod tests {
              arithmetic: rows binary16, \
              updates f32; on chip: velocities binary16, impulses binary16)"
         );
-        for text in ["float", "naive,flush", "float,world", "half,f32"] {
+        for text in ["float", "naive,unchecked", "float,world", "half,f32"] {
             assert_eq!(described(&text.parse::<Build>().expect(text).config()), text);
         }
         let of_this_machine: Build = "float,threads=1,fast=off".parse().expect("a build");

@@ -101,7 +101,6 @@ fn options_of_the_emulated_board_are_refused_for_a_real_one() {
     for (option, value) in [
         ("--hazards", "unchecked"),
         ("--window", "64"),
-        ("--subnormals", "flush"),
         ("--bandwidth", "unlimited"),
         ("--length-width", "14"),
         ("--address-width", "32"),
@@ -303,8 +302,8 @@ fn solve_compares_with_every_stage_of_the_golden_step() {
         cases.push(vec!["--no-integrate", "--friction-iterations", k]);
     }
     for case in cases {
-        for subnormals in ["keep", "flush"] {
-            let arguments = ["solve", folder, "--compare", "--json", "--subnormals", subnormals];
+        for profile in ["float", "naive"] {
+            let arguments = ["solve", folder, "--compare", "--json", "--profile", profile];
             let ran = run(arguments.iter().chain(&case));
             assert_eq!(ran.code, Some(0), "{case:?}: {} {}", ran.stdout, ran.stderr);
             let document = ran.json();

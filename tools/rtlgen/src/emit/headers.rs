@@ -92,8 +92,7 @@ fn capabilities(text: &mut Text, design: &Design) {
     };
     let streams = |streams: &[u32]| u32::try_from(streams.len()).unwrap_or(0);
     let deep = |Depth { fill, window }| depth::WINDOW.put(depth::FILL.put(0, fill), window);
-    let features = features::FLUSH_SUBNORMALS.mask()
-        | features::WORLD_INERTIA.put(0, (parameters.inertia == Inertia::World).into())
+    let features = features::WORLD_INERTIA.put(0, (parameters.inertia == Inertia::World).into())
         | features::INTERLOCKED.put(0, parameters.interlocked.into());
     let [fence_base, fence_size] = Fence::to_registers(Some(parameters.memory));
     let words = [

@@ -37,12 +37,11 @@ Examples:
   pgs thesis compare float,world float,world,unchecked --scene shapes --grid 8x8x8
 
 Examples with the Verilog in simulation (docs/bitstream.md):
-  pgs thesis compare float,flush float,flush --grid 2x2x2 --steps 3 --accelerator \
+  pgs thesis compare float float --grid 2x2x2 --steps 3 --accelerator \
   rtl:rtl-sim/pgs-rtl
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
-change is a word: f32, binary16 (arithmetic), interlocked, unchecked, keep, flush, isotropic, \
-world; or window=SLOTS,
+change is a word: f32, binary16 (arithmetic), interlocked, unchecked, isotropic, world; or window=SLOTS,
 bandwidth=GBPS, length-width=BITS, address-width=BITS, threads=N and
 fast=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
 hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,

@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use bitstream_model::interface::profile::Profile;
-use bitstream_model::{
-    BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount, Subnormals,
-};
+use bitstream_model::{BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount};
 use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::error::Aftermath;
 use zynq_pgs::{
@@ -216,8 +214,7 @@ impl Bench {
     /// The setting of a board that equals one with a simulator, for the model.
     pub(super) fn like_simulator(profile: &'static Profile) -> Result<Self, Failure> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
-        let subnormals = Subnormals::Flush;
-        let config = BoardConfig { profile, delays, subnormals, ..BoardConfig::default() };
+        let config = BoardConfig { profile, delays, ..BoardConfig::default() };
         Self::of(config, Start::Cold, SIMULATOR_DEADLINE)
     }
 
