@@ -34,8 +34,7 @@ pub struct BoardOptions {
                      uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for \
                      each region), devmem (registers through /dev/mem, at the addresses of the \
                      interface; needs root), emulated or socket:PATH (one that `pgs serve` serves) \
-                     [env: \
-                     PGS_BOARD] [default: auto]",
+                     [env: PGS_BOARD] [default: auto]",
         long,
         value_name = "BOARD",
         value_parser = board_name
@@ -64,8 +63,7 @@ pub struct ManagerOptions {
         help = "FPGA manager that knows whether a real board's logic is programmed: auto (the \
                 ZynqMP's own, by its name), a device such as fpga1, or none (no check, for logic \
                 that the kernel did not load, for example by JTAG. WARNING: an access to logic \
-                that \
-                is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
+                that is not programmed hangs the processor) [env: PGS_MANAGER] [default: auto]",
         long,
         value_name = "MANAGER",
         value_parser = manager_choice
@@ -82,8 +80,7 @@ pub struct AcceleratorOptions {
         help = "Accelerator of an emulated board: model, rtl:PATH, a simulator of the generated \
                 Verilog (`rtlgen simulator` builds one), or both:PATH, the simulator with the \
                 model beside it on the same beats, up to the first difference [env: PGS_RTL, the \
-                PATH of \
-                rtl] [default: model]",
+                PATH of rtl] [default: model]",
         long,
         value_name = "ACCELERATOR",
         value_parser = accelerator_choice

@@ -41,8 +41,8 @@ pub struct ThesisArgs {
 }
 
 /// All experiments, in the order of the thesis.
-pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
-    let mut all: Vec<&'static dyn Experiment> = vec![
+pub(crate) fn experiments() -> Vec<&'static Experiment> {
+    let mut all: Vec<&'static Experiment> = vec![
         &study::time_step::TIME_STEP,
         &study::stopping::STOPPING,
         &study::split::SPLIT,
@@ -56,8 +56,8 @@ pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
         &detect::DETECTION,
         &compare::COMPARE,
     ];
-    all.extend(formulas::FORMULAS.iter().map(|formula| formula as &dyn Experiment));
-    all.sort_by_key(|experiment| section_key(experiment.thesis()));
+    all.extend(&formulas::FORMULAS);
+    all.sort_by_key(|experiment| section_key(experiment.thesis));
     all
 }
 
@@ -68,9 +68,10 @@ impl Args for ThesisArgs {
             .action(ArgAction::SetTrue)
             .help("Print Markdown instead of text");
         let each = experiments().into_iter().map(|experiment| {
-            let command = experiment.arguments(Command::new(experiment.id()));
+            let command =
+                (experiment.arguments)(Command::new(experiment.id)).about(experiment.about);
             let command = command.arg(markdown.clone());
-            match experiment.boards() {
+            match experiment.boards {
                 Boards::None => command,
                 Boards::Own => AcceleratorOptions::augment_args(command),
                 Boards::Any => {
@@ -126,7 +127,7 @@ impl ThesisArgs {
             let accelerator = self.all.is_asked().then(AcceleratorOptions::default);
             return Given { accelerator, ..Given::default() };
         };
-        let boards = experiments().iter().find(|each| each.id() == name).map(|each| each.boards());
+        let boards = experiments().iter().find(|each| each.id == name).map(|each| each.boards);
         let has = |least| boards.filter(|boards| *boards >= least);
         // The same parser has put the options there.
         Given {
@@ -144,7 +145,7 @@ impl ThesisArgs {
         out: &mut dyn Write,
     ) -> Result<Verdict, Failure> {
         let named = self.one.as_ref().and_then(|(name, options)| {
-            let experiment = experiments().into_iter().find(|each| each.id() == name)?;
+            let experiment = experiments().into_iter().find(|each| each.id == name)?;
             Some((experiment, options))
         });
         let Some((experiment, options)) = named else { return list(&session.common, out) };
@@ -153,7 +154,7 @@ impl ThesisArgs {
             return Err(Failure::input("--json and --markdown exclude each other")
                 .next("leave one of them out"));
         }
-        let part = experiment.run(options, session)?;
+        let part = (experiment.run)(options, session)?;
         match (session.common.json, markdown) {
             (true, _) => writeln!(out, "{:#}", part.to_json(experiment))?,
             (_, true) => part.write_markdown(experiment, out)?,
@@ -168,7 +169,7 @@ fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
     let columns = [("name", "name"), ("thesis", "thesis"), ("about", "")];
     let mut table = Table::with_columns("experiments", "Experiments", &columns);
     for experiment in experiments() {
-        table.row([text(experiment.id()), text(experiment.thesis()), text(experiment.about())]);
+        table.row([text(experiment.id), text(experiment.thesis), text(experiment.about)]);
     }
     match common.json {
         true => {
@@ -227,7 +228,7 @@ pub(crate) mod tests {
     #[test]
     fn the_definition_is_consistent_and_each_name_stands_once() {
         ThesisArgs::augment_args(Command::new("thesis")).debug_assert();
-        let mut names: Vec<_> = experiments().iter().map(|each| each.id()).collect();
+        let mut names: Vec<_> = experiments().iter().map(|each| each.id).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|two| two[0] != two[1]), "{names:?}");
         for wrong in ["pgs thesis frobnicate", "pgs thesis --all", "pgs thesis --quick"] {

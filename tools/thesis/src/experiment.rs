@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use clap::{ArgMatches, Args, Command};
+use clap::{ArgMatches, Command, FromArgMatches};
 use pgs_command::failure::{Failure, Verdict};
 use pgs_command::output::facts::fact;
 use pgs_command::output::width::stdout_width;
@@ -32,24 +32,24 @@ pub(crate) enum Boards {
 }
 
 /// An experiment of the thesis part.
-pub(crate) trait Experiment: Sync {
+pub(crate) struct Experiment {
     /// Its name on the command line.
-    fn id(&self) -> &'static str;
-
+    pub(crate) id: &'static str,
     /// Its place in the thesis.
-    fn thesis(&self) -> &'static str;
-
+    pub(crate) thesis: &'static str,
     /// Its subject, in a line.
-    fn about(&self) -> &'static str;
-
+    pub(crate) about: &'static str,
     /// The boards that it steps.
-    fn boards(&self) -> Boards;
-
+    pub(crate) boards: Boards,
     /// Adds its arguments and its help.
-    fn arguments(&self, command: Command) -> Command;
+    pub(crate) arguments: fn(Command) -> Command,
+    /// Measures or computes; the matches are of its arguments.
+    pub(crate) run: fn(&ArgMatches, &Session) -> Result<Part, Failure>,
+}
 
-    /// Measures or computes; `matches` are of its arguments.
-    fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure>;
+/// The arguments of an experiment.
+pub(crate) fn given<A: FromArgMatches>(matches: &ArgMatches) -> Result<A, Failure> {
+    A::from_arg_matches(matches).map_err(Failure::input)
 }
 
 /// A folder as a figure names it: as it was given, or only its name. A page is passed on, and the
@@ -133,12 +133,12 @@ impl Part {
     }
 
     /// For programs.
-    pub(crate) fn to_json(&self, experiment: &dyn Experiment) -> Value {
+    pub(crate) fn to_json(&self, experiment: &Experiment) -> Value {
         let mut document = self.data.clone();
         document["schema"] = SCHEMA.into();
         document["verb"] = "thesis".into();
-        document["experiment"] = experiment.id().into();
-        document["thesis"] = experiment.thesis().into();
+        document["experiment"] = experiment.id.into();
+        document["thesis"] = experiment.thesis.into();
         document["complete"] = self.complete.into();
         document["tables"] = self.tables.iter().map(Table::to_json).collect();
         document["figures"] = self.figures.iter().map(Figure::to_json).collect();
@@ -174,10 +174,10 @@ impl Part {
     /// As Markdown.
     pub(crate) fn write_markdown(
         &self,
-        experiment: &dyn Experiment,
+        experiment: &Experiment,
         out: &mut dyn Write,
     ) -> Result<(), Failure> {
-        writeln!(out, "## {}: {}\n", experiment.thesis(), experiment.id())?;
+        writeln!(out, "## {}: {}\n", experiment.thesis, experiment.id)?;
         for (_, text) in &self.facts {
             writeln!(out, "{text}\n")?;
         }
@@ -185,42 +185,6 @@ impl Part {
             write!(out, "{}", table.to_markdown())?;
         }
         Ok(())
-    }
-}
-
-/// An experiment by a function of its arguments.
-pub(crate) struct Measured<A> {
-    pub(crate) id: &'static str,
-    pub(crate) thesis: &'static str,
-    pub(crate) about: &'static str,
-    pub(crate) boards: Boards,
-    pub(crate) run: fn(&A, &Session) -> Result<Part, Failure>,
-}
-
-impl<A: Args> Experiment for Measured<A> {
-    fn id(&self) -> &'static str {
-        self.id
-    }
-
-    fn thesis(&self) -> &'static str {
-        self.thesis
-    }
-
-    fn about(&self) -> &'static str {
-        self.about
-    }
-
-    fn boards(&self) -> Boards {
-        self.boards
-    }
-
-    fn arguments(&self, command: Command) -> Command {
-        A::augment_args(command).about(self.about)
-    }
-
-    fn run(&self, matches: &ArgMatches, session: &Session) -> Result<Part, Failure> {
-        let arguments = A::from_arg_matches(matches).map_err(Failure::input)?;
-        (self.run)(&arguments, session)
     }
 }
 

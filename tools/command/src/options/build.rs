@@ -128,8 +128,7 @@ pub fn described(config: &BoardConfig) -> String {
         variant.numbers;
     format!(
         "{build} (streams: collisions {}, velocities {}, poses {}; arithmetic: rows {}, updates \
-         {}; on chip: \
-         velocities {}, impulses {})",
+         {}; on chip: velocities {}, impulses {})",
         collisions.name(),
         bodies.name(),
         poses.name(),
@@ -191,8 +190,7 @@ mod tests {
         assert_eq!(
             of("half", |numbers| numbers.velocities = Precision::F32),
             "half (streams: collisions binary16, velocities binary16, poses binary16; arithmetic: \
-             rows binary16, \
-             updates binary16; on chip: velocities f32, impulses binary16)"
+             rows binary16, updates binary16; on chip: velocities f32, impulses binary16)"
         );
         assert_eq!(
             of("half", |numbers| numbers.updates = Precision::F32),

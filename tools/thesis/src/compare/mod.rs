@@ -22,7 +22,7 @@ use zynq_pgs::StepParameters;
 use self::side::Side;
 use self::spec::SideSpec;
 use crate::deviation::{StateDeviation, moving};
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use crate::study::run::World;
 use crate::table::Table;
@@ -66,12 +66,13 @@ taken, 1 if one failed.";
 const ROWS: u32 = 10;
 
 /// The experiment.
-pub(crate) static COMPARE: Measured<CompareArgs> = Measured {
+pub(crate) static COMPARE: Experiment = Experiment {
     id: "compare",
     thesis: "§4.6.3, equation 4.1",
     about: "Two boards from the same start, and how far they diverge",
     boards: Boards::Own,
-    run: measure,
+    arguments: CompareArgs::augment_args,
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.

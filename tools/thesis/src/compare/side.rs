@@ -91,7 +91,7 @@ impl<'a> Side<'a> {
             let mut opened = board::open(&common, &spec.build)?;
             let world = world(&opened)?;
             if let Err(error) = step_input::set_shapes(&mut opened.accelerator, world.shapes()) {
-                return Err(failure(&opened, &world, error));
+                return Err(world.failure(&opened, error));
             }
             Ok((opened, world))
         };
@@ -126,7 +126,7 @@ impl<'a> Side<'a> {
             Ok(report) => report,
             Err(error) => {
                 let body = body_of(&error);
-                let failure = failure(&self.opened, &self.run.world, error);
+                let failure = self.run.world.failure(&self.opened, error);
                 self.failed = Some(Failed { step: number, body, failure });
                 return None;
             }
@@ -181,16 +181,6 @@ impl<'a> Side<'a> {
             })
         });
         value
-    }
-}
-
-/// Makes a failure of the driver's error; for a folder, with the array at fault.
-fn failure(opened: &OpenBoard, world: &World<'_>, error: Error) -> Failure {
-    match world {
-        World::Folder { folder, .. } if error.is_input() => {
-            Failure::input(step_input::locate(error, folder))
-        }
-        _ => opened.failure(error),
     }
 }
 

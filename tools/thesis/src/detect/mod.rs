@@ -16,7 +16,7 @@ use serde_json::json;
 
 use self::comparison::Comparison;
 use self::input::Input;
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 
 const EXAMPLES: &str = "\
@@ -45,12 +45,13 @@ more than 1 mm off is counted under its cause:
   unknown   none of these";
 
 /// The experiment.
-pub(crate) static DETECTION: Measured<DetectionArgs> = Measured {
+pub(crate) static DETECTION: Experiment = Experiment {
     id: "detection",
     thesis: "§2.2.2",
     about: "Our collision detection beside a folder's collisions of the same poses",
     boards: Boards::None,
-    run: measure,
+    arguments: DetectionArgs::augment_args,
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.
@@ -65,8 +66,8 @@ pub(crate) struct DetectionArgs {
 /// Detects, and compares.
 fn measure(args: &DetectionArgs, _: &Session) -> Result<Part, Failure> {
     let path = &args.input;
-    let input = Input::new(step_input::load(path)?).map_err(Failure::input)?;
-    input.check_collisions().map_err(Failure::input)?;
+    let input = Input::new(step_input::load(path)?)?;
+    input.check_collisions()?;
     let mut scene = Scene::of_cubes(input.bodies()).map_err(|error| {
         Failure::input(error)
             .about(path.display().to_string())

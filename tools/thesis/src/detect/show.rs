@@ -55,8 +55,7 @@ pub(super) fn part(comparison: &Comparison, scene: &Scene) -> Part {
     let depth = penetration(scene.collisions());
     let collisions = format!(
         "{} of {} bodies, {} of them with the ground; {} points, {} of them penetrating, {} mm \
-         deep \
-         at most",
+         deep at most",
         grouped(scene.collisions().len() as u64),
         grouped(scene.bodies().len() as u64),
         grouped(scene.ground_pairs() as u64),

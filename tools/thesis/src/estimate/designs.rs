@@ -12,6 +12,7 @@
 //! 2 to 5  c - pA      distance     +infinity where there is no point
 //! ```
 
+use super::step::StepShape;
 use pgs_interface::number::{Numbers, StreamFormat};
 use pgs_interface::profile::{
     Depth, FLOAT, HALF, NAIVE, OnChipMemory, Profile, RecordWords, Variant,
@@ -134,6 +135,53 @@ impl Window {
         let friction = friction_passes.div_ceil(self.friction_units);
         let most = if contact > friction { contact } else { friction };
         (most * initiation_interval).div_ceil(collisions_per_issue)
+    }
+
+    /// Issues of a unit for each streamed entry, with four passes of each kind.
+    pub(crate) fn issues_per_entry(&self) -> u32 {
+        let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
+        let of = |passes: u64, units: u32| {
+            u32::try_from(passes).unwrap_or(u32::MAX).div_ceil(units.max(1))
+        };
+        of(contact_iterations, self.contact_units).max(of(friction_iterations, self.friction_units))
+    }
+}
+
+/// An array that stays on chip while a step runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnChipArray {
+    /// Linear and angular velocity of each body.
+    Velocities,
+    /// World inverse inertia of each body.
+    Inertia,
+    /// Accumulated impulses of each collision.
+    Impulses,
+    /// Shape index of each body.
+    ShapeIndices,
+    /// Records with their impulses on the way to a contact pass.
+    ContactLines,
+    /// Records without distances, with their impulses, on the way to a friction pass.
+    FrictionLines,
+}
+
+impl OnChipArray {
+    /// Whether the array has a row for each body, and not for each collision.
+    #[must_use]
+    pub const fn is_of_bodies(self) -> bool {
+        matches!(self, Self::Velocities | Self::Inertia | Self::ShapeIndices)
+    }
+
+    /// Name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Velocities => "velocities",
+            Self::Inertia => "world inertia",
+            Self::Impulses => "impulses",
+            Self::ShapeIndices => "shape indices",
+            Self::ContactLines => "contact lines",
+            Self::FrictionLines => "friction lines",
+        }
     }
 }
 

@@ -28,53 +28,13 @@
 //! to 6), the colours would bind the order of the collisions, and the banks would be filled
 //! unevenly.
 
-use super::cycles::StepShape;
-use super::designs::Window;
-use super::schedule::Schedule;
+use super::designs::{OnChipArray, Window};
+use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
-use super::window;
 use pgs_interface::profile::{Inertia, Variant};
 
 /// Ports of a block RAM.
 pub const PORTS: u32 = 2;
-
-/// An array that stays on chip while a step runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OnChipArray {
-    /// Linear and angular velocity of each body.
-    Velocities,
-    /// World inverse inertia of each body.
-    Inertia,
-    /// Accumulated impulses of each collision.
-    Impulses,
-    /// Shape index of each body.
-    ShapeIndices,
-    /// Records with their impulses on the way to a contact pass.
-    ContactLines,
-    /// Records without distances, with their impulses, on the way to a friction pass.
-    FrictionLines,
-}
-
-impl OnChipArray {
-    /// Whether the array has a row for each body, and not for each collision.
-    #[must_use]
-    pub const fn is_of_bodies(self) -> bool {
-        matches!(self, Self::Velocities | Self::Inertia | Self::ShapeIndices)
-    }
-
-    /// Name in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Velocities => "velocities",
-            Self::Inertia => "world inertia",
-            Self::Impulses => "impulses",
-            Self::ShapeIndices => "shape indices",
-            Self::ContactLines => "contact lines",
-            Self::FrictionLines => "friction lines",
-        }
-    }
-}
 
 /// Use of the ports of one array during a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,12 +78,6 @@ impl PortUse {
     #[must_use]
     pub const fn with(self, copies: u32, pump: u32) -> Self {
         Self { copies, pump, ..self }
-    }
-
-    /// The access on each port in each cycle, in the shortest interval that the ports allow.
-    #[must_use]
-    pub fn schedule(&self) -> Schedule {
-        Schedule::new(self)
     }
 }
 
@@ -234,7 +188,7 @@ fn stream_interval(variant: &Variant) -> u32 {
     let traffic = StepTraffic::new(variant, Records::Streamed, &step);
     let mut entries = u64::from(issues);
     if let Some(design) = Window::of(profile) {
-        entries *= u64::from(window::issues_per_entry(design));
+        entries *= u64::from(design.issues_per_entry());
     }
     let interval = traffic.collisions.cycles.div_ceil(entries);
     u32::try_from(interval).unwrap_or(u32::MAX)

@@ -3,8 +3,9 @@
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
 use super::blocks::{BLOCK_BITS, ShapedBlocks};
+use super::designs::OnChipArray;
 use super::designs::Window;
-use super::ports::{OnChipArray, PortAccount};
+use super::ports::PortAccount;
 use super::window;
 use pgs_interface::profile::Variant;
 

@@ -94,7 +94,7 @@ mod tests {
         for profile in DESIGNS {
             let variant = Variant { inertia: Inertia::World, ..profile.default_variant() };
             for ports in PortAccount::new(&variant).arrays {
-                let schedule = ports.schedule();
+                let schedule = Schedule::new(&ports);
                 assert!(schedule.interval <= profile.initiation_interval);
                 let places = |kind, collision, row| {
                     let access = Some(Access { kind, collision, row });
@@ -133,7 +133,7 @@ mod tests {
                 let account = PortAccount::new(&Variant { inertia, ..profile.default_variant() });
                 for ports in account.arrays.into_iter().filter(PortUse::simple) {
                     simple += 1;
-                    let schedule = ports.schedule();
+                    let schedule = Schedule::new(&ports);
                     for kind in [AccessKind::Read, AccessKind::Write] {
                         let of_kind = |slot: &&Slot| slot.access.is_some_and(|a| a.kind == kind);
                         let moment = |slot: &Slot| (slot.cycle, slot.phase, slot.copy);
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn half_reads_body_a_from_one_copy_and_body_b_from_the_other() {
         let account = PortAccount::new(&HALF.default_variant());
-        let schedule = account.velocities().expect("they are on chip").schedule();
+        let schedule = Schedule::new(account.velocities().expect("they are on chip"));
         for slot in &schedule.slots {
             match slot.access {
                 Some(Access { kind: AccessKind::Read, row, .. }) => {

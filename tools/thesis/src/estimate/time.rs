@@ -4,9 +4,10 @@
 //! and the poses in with the results out. Fill is added, because nothing streams meanwhile. Where
 //! the passes run side by side, all records stream beside them and count in their part.
 
-use super::cycles::{StepCycles, StepShape};
+use super::cycles::StepCycles;
 use super::designs::Window;
 use super::ports::PortAccount;
+use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::Variant;

@@ -4,9 +4,8 @@
 //! run side by side, and each takes `128 / width` cycles for a beat of 128 bits. The array takes
 //! the cycles of its busiest stream.
 
-use super::cycles::StepShape;
 use super::designs::{self, Window};
-use super::window;
+use super::step::StepShape;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::{Inertia, RecordWords, THESIS_WORDS, Variant};
 use pgs_interface::record::{LANES, pose, result};
@@ -233,7 +232,7 @@ impl StreamDemand {
         let issue = StepTraffic::new(variant, Records::Streamed, &step).collisions;
         let clock = f64::from(profile.clock_khz) * 1e3;
         let ports = profile.mm2s_widths.len();
-        let issues = Window::of(profile).map_or(1, window::issues_per_entry);
+        let issues = Window::of(profile).map_or(1, Window::issues_per_entry);
         let cycles = profile.initiation_interval.saturating_mul(issues).max(1);
         Self {
             ports,

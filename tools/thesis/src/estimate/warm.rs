@@ -1,7 +1,8 @@
 //! The cost of a warm start: a pass more of each kind, and impulses in and out.
 
-use super::cycles::{StepCycles, StepShape};
+use super::cycles::StepCycles;
 use super::designs;
+use super::step::StepShape;
 use super::traffic::{Records, StepTraffic, Transfer};
 use pgs_interface::profile::{Depth, Variant};
 use pgs_interface::record::BEAT_BYTES;

@@ -15,9 +15,8 @@
 //! DSPs and lookup tables are extrapolated from the thesis' designs, which have one unit of each
 //! kind.
 
-use super::cycles::StepShape;
-use super::designs::Window;
-use super::ports::OnChipArray;
+use super::designs::{OnChipArray, Window};
+use super::step::StepShape;
 use super::thesis::recorded::{Design, FLOAT_DESIGN, HALF_DESIGN};
 use super::traffic::{Records, StepTraffic};
 use pgs_interface::number::Precision;
@@ -141,14 +140,6 @@ fn slot(variant: &Variant, design: &Window, shape: &StepShape) -> u64 {
         profile.collisions_per_issue.max(1),
     );
     slot.into()
-}
-
-/// Issues of a unit for each streamed entry, with four passes of each kind.
-pub(crate) fn issues_per_entry(design: &Window) -> u32 {
-    let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
-    let of =
-        |passes: u64, units: u32| u32::try_from(passes).unwrap_or(u32::MAX).div_ceil(units.max(1));
-    of(contact_iterations, design.contact_units).max(of(friction_iterations, design.friction_units))
 }
 
 /// An array of a design with a window: its memories, and the rows of each.

@@ -67,8 +67,7 @@ pub(super) fn add(part: &mut Part, kinds: &[Numbers], step: &str) {
         let [all, zeros] = [values.len() as u64, Sizes::of(values.iter()).zeros].map(grouped);
         let caption = format!(
             "{all} numbers of {step}, four bins a decade; {zeros} are 0 and not shown, nor are \
-             numbers \
-             outside the axis."
+             numbers outside the axis."
         );
         Figure::new(id, title, lines(x, count, &series), caption)
     };
@@ -107,8 +106,7 @@ pub(super) fn add(part: &mut Part, kinds: &[Numbers], step: &str) {
         all,
         "Each dot is a number: all errors of 1 % and more, and a sample of the smaller ones. Below \
          6.1e-5 binary16 has subnormal numbers, and the relative error grows; numbers that \
-         binary16 holds exactly \
-         have no error and no dot."
+         binary16 holds exactly have no error and no dot."
             .to_owned(),
     );
     let row = figure.row(

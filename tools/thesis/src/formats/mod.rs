@@ -19,7 +19,7 @@ use zynq_pgs::StepParameters;
 use self::numbers::{AS_STREAMED, Numbers, SUMS};
 pub(crate) use self::numbers::{EACH_ONCE, numbers};
 pub(crate) use self::tally::{Loss, Sizes};
-use crate::experiment::{Boards, Measured, Part, shown};
+use crate::experiment::{Boards, Experiment, Part, given, shown};
 use crate::narrow::NarrowFormat;
 use crate::session::Session;
 use crate::study::given::GivenStep;
@@ -40,12 +40,13 @@ Relative errors are |read back - number| / |number|. A zero has no relative erro
 count as below 3e-5. The driver refuses a number that a format cannot carry.";
 
 /// The experiment.
-pub(crate) static FORMATS: Measured<FormatsArgs> = Measured {
+pub(crate) static FORMATS: Experiment = Experiment {
     id: "formats",
     thesis: "§4.6.2, Figures 4.5 to 4.8",
     about: "The sizes of a step's numbers, and their errors in 16-bit formats",
     boards: Boards::Any,
-    run: measure,
+    arguments: FormatsArgs::augment_args,
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.

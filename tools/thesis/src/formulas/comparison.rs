@@ -58,8 +58,7 @@ fn platforms() -> Table {
     ]);
     table.note(format!(
         "T6.2 and T6.3 give thermal design powers of {} and {} W for the same GPU and CPU; the 15 \
-         W of \
-         the board are its maximum, not measured.",
+         W of the board are its maximum, not measured.",
         GPU.design_watts, CPU.design_watts
     ));
     table
@@ -220,8 +219,7 @@ fn against(scene: &Scene) -> Table {
         "Recomputed: from the thesis' own cycles, clock and powers, unrounded. Ours: packed \
          records without a wait for memory, as the thesis counts; then records as streamed, at \
          unlimited, 17.07 and 12.8 GB/s. Time and power of GPU and CPU, the board's 15 W and the \
-         share of 60 % in equation \
-         6.5 are the thesis'; no figure was measured here.",
+         share of 60 % in equation 6.5 are the thesis'; no figure was measured here.",
     );
     table.note(format!(
         "TDP: with the {} and {} W that T6.2 and T6.3 print for the same GPU and CPU, in place of \
@@ -232,8 +230,7 @@ fn against(scene: &Scene) -> Table {
         "The thesis divides energies that it has rounded to two digits; 133 W over 15 W is 8.87, \
          not 8.67. Its Figures 6.1 and 6.2 chart its first design, naive, and its text prints no \
          numbers of it. Ours is a lower bound of it: the thesis converts contacts in a kernel of \
-         its own, whose rows go \
-         through memory, ours within the passes.",
+         its own, whose rows go through memory, ours within the passes.",
     );
     table
 }
@@ -295,8 +292,7 @@ pub(super) fn figures(part: &mut Part) {
         text prints no numbers of it. Our naive converts contacts within the passes, the thesis in \
         a kernel of its own whose rows go through memory: ours is a lower bound of its first \
         design. mixed, windowed and windowed16 are this project's own, and no boards: no hardware \
-        has them, and no processor \
-         of this class can order collisions for the last two.";
+        has them, and no processor of this class can order collisions for the last two.";
     let (figure, row) = over_both(
         ("figure-6-1", "§6.5, Figure 6.1"),
         ["speed-up", "Speed-up of each design over GPU and CPU", caption],
@@ -306,8 +302,7 @@ pub(super) fn figures(part: &mut Part) {
     part.figure(figure, [row]);
     let caption = "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and \
         not measured. The table of the comparison has the thermal design powers of its Tables 6.2 \
-        and 6.3 \
-         beside them.";
+        and 6.3 beside them.";
     let (figure, row) = over_both(
         ("figure-6-2", "§6.5, Figure 6.2"),
         ["energy efficiency", "Energy efficiency of each design over GPU and CPU", caption],

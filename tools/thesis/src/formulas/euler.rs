@@ -25,8 +25,7 @@ pub(super) fn tables(_: &Scene) -> Vec<Table> {
     }
     table.note(
         "a dt² n (n - 1) / 2 is 499.500 m for dt = 1/100 s; the thesis prints the first digits of \
-        the \
-         single-precision result.",
+        the single-precision result.",
     );
     vec![table]
 }
@@ -65,8 +64,7 @@ pub(super) fn figures(part: &mut Part) {
         "The acceleration is 10 m/s². The explicit rule moves a body by the speed at the start of \
          a step, the symplectic rule by the speed at its end: their errors are equal and opposite. \
          The board moves a body before gravity adds to its speed, which is the explicit rule for a \
-         body in free \
-         flight.",
+         body in free flight.",
     )
     .modelled();
     let row = figure.row(

@@ -50,8 +50,7 @@ fn footprint(scene: &Scene) -> Table {
     }
     table.note(
         "Differences are of the two digits that the thesis prints. Positions would be kept in as \
-         many \
-         copies as the velocities; no profile keeps them.",
+         many copies as the velocities; no profile keeps them.",
     );
     table
 }
@@ -79,8 +78,7 @@ fn arrays(scene: &Scene) -> Table {
         "Row: bytes. A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the \
          fewest blocks of one shape side by side and one after the other; 1024 x 18 and narrower \
          have two ports that read and write, 512 x 36 one to read and one to write (UG573). The \
-         thesis has one shape of body \
-         and no shape indices.",
+         thesis has one shape of body and no shape indices.",
     );
     table
 }
@@ -174,8 +172,7 @@ pub(super) fn streams(scene: &Scene) -> Vec<Table> {
     }
     table.note(format!(
         "Each stream takes one of the {HP_PORTS} high-performance ports of 128 bits (UG1085). HP1 \
-         and \
-         HP2 share a port of the memory controller. Above 100 % a pass waits for the memory.",
+         and HP2 share a port of the memory controller. Above 100 % a pass waits for the memory.",
     ));
     vec![table]
 }

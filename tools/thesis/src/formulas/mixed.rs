@@ -50,8 +50,7 @@ fn against_float(scene: &Scene, mixed: &Variant) -> Table {
     let account = PortAccount::new(mixed);
     table.note(format!(
         "Initiation interval {}: the ports of the on-chip arrays allow {}, the beats of a record \
-         on its \
-         streams {}; {}.",
+         on its streams {}; {}.",
         account.claimed,
         account.by_ports(),
         account.by_streams,

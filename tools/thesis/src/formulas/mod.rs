@@ -13,8 +13,8 @@ mod warm;
 mod windowed;
 
 use bitstream_model::Bandwidth;
-use clap::Args;
 use clap::builder::PossibleValuesParser;
+use clap::{ArgMatches, Args, Command};
 use pgs_command::failure::Failure;
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::number;
@@ -23,7 +23,7 @@ use serde_json::json;
 
 use self::scene::Scene;
 use crate::estimate::{DESIGNS, StepShape, thesis};
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use crate::table::Table;
 
@@ -133,6 +133,11 @@ impl StepArgs {
     }
 }
 
+/// The tables of the step that the arguments give.
+fn part(args: &ArgMatches, id: &str, tables: Tables) -> Result<Part, Failure> {
+    given::<StepArgs>(args)?.part(id, tables)
+}
+
 /// Tables by formula.
 type Tables = fn(&Scene) -> Vec<Table>;
 
@@ -141,55 +146,56 @@ const fn formula(
     id: &'static str,
     thesis: &'static str,
     about: &'static str,
-    run: fn(&StepArgs, &Session) -> Result<Part, Failure>,
-) -> Measured<StepArgs> {
-    Measured { id, thesis, about, boards: Boards::None, run }
+    run: fn(&ArgMatches, &Session) -> Result<Part, Failure>,
+) -> Experiment {
+    let (boards, arguments) = (Boards::None, StepArgs::augment_args as fn(Command) -> Command);
+    Experiment { id, thesis, about, boards, arguments, run }
 }
 
 /// All of them.
-pub(crate) static FORMULAS: [Measured<StepArgs>; 10] = [
+pub(crate) static FORMULAS: [Experiment; 10] = [
     formula(
         "step",
         "Tables 6.4 and 6.8",
         "Cycles and time of a step, and what world inertia costs",
-        |args, _| args.part("step", step::tables),
+        |args, _| part(args, "step", step::tables),
     ),
     formula("mixed", "§7.3", "A design of ours, mixed, against float", |args, _| {
-        args.part("mixed", mixed::tables)
+        part(args, "mixed", mixed::tables)
     }),
     formula(
         "windowed",
         "§4.7, §7.3",
         "Two designs that stream the collisions once, against float",
-        |args, _| args.part("windowed", windowed::tables),
+        |args, _| part(args, "windowed", windowed::tables),
     ),
     formula("data", "§4.4.1, Tables 4.1 to 4.6", "Words in and out", |args, _| {
-        args.part("data", data::tables)
+        part(args, "data", data::tables)
     }),
     formula("memory", "§4.4.2, Tables 6.4 and 6.8", "On-chip memory and logic", |args, _| {
-        args.part("memory", memory::tables)
+        part(args, "memory", memory::tables)
     }),
     formula("streams", "§5.4.2", "Stream widths and memory bandwidth", |args, _| {
-        args.part("streams", memory::streams)
+        part(args, "streams", memory::streams)
     }),
     formula("ports", "§5.4.3, §5.5", "Block RAM ports and the initiation interval", |args, _| {
-        args.part("ports", ports::tables)
+        part(args, "ports", ports::tables)
     }),
     formula("warm", "§2.2.3", "The cost of a warm start", |args, _| {
-        args.part("warm", warm::tables)
+        part(args, "warm", warm::tables)
     }),
     formula(
         "comparison",
         "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
         "Speed-up and energy against GPU and CPU",
         |args, _| {
-            let mut part = args.part("comparison", comparison::tables)?;
+            let mut part = part(args, "comparison", comparison::tables)?;
             comparison::figures(&mut part);
             Ok(part)
         },
     ),
     formula("euler", "§2.1.3, Figure 2.6", "Explicit integration of a fall", |args, _| {
-        let mut part = args.part("euler", euler::tables)?;
+        let mut part = part(args, "euler", euler::tables)?;
         euler::figures(&mut part);
         Ok(part)
     }),
@@ -198,13 +204,7 @@ pub(crate) static FORMULAS: [Measured<StepArgs>; 10] = [
 /// The parts of the thesis' step.
 #[cfg(test)]
 pub(crate) fn thesis_parts() -> Vec<Part> {
-    let args = StepArgs {
-        collisions: None,
-        bodies: None,
-        profile: ALL.to_owned(),
-        world_inertia: false,
-        bandwidth: None,
-    };
+    let args = StepArgs::augment_args(Command::new("step")).get_matches_from(["step"]);
     let session = Session::new(&pgs_command::common::CommonArgs::emulated());
     FORMULAS.iter().map(|formula| (formula.run)(&args, &session).expect("tables")).collect()
 }

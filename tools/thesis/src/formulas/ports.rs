@@ -1,7 +1,7 @@
 //! The tables of the block RAM ports: the initiation interval that they allow, and the schedule of
 //! each port.
 
-use crate::estimate::{Access, AccessKind, PortAccount, PortUse, Slot};
+use crate::estimate::{Access, AccessKind, PortAccount, PortUse, Schedule, Slot};
 
 use super::scene::{Scene, yes_or_no};
 use crate::table::{Cell, Kind, Table, text};
@@ -10,8 +10,7 @@ use crate::table::{Cell, Kind, Table, text};
 pub(super) const PUMP: &str = "The pump, block RAM at twice the accelerator's clock (500 or 550 \
     MHz), is a design assumption and was not synthesised. A global clock tree may run at 775 MHz \
     (DS925 1.29, clock buffers, speed grade -2, 0.85 V); the limit of the block RAM itself in \
-    DS925 was not \
-    verified.";
+    DS925 was not verified.";
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![arrays(scene), intervals(scene), schedule(scene), alternatives(scene), load(scene)]
@@ -38,8 +37,7 @@ fn arrays(scene: &Scene) -> Table {
     }
     table.note(
         "A copy has two ports; each takes one row a clock, twice that many with a pump of 2. A \
-         read \
-         goes to one copy, a write to all: cycles = ceil(busiest copy / (2 x pump)).",
+         read goes to one copy, a write to all: cycles = ceil(busiest copy / (2 x pump)).",
     );
     table
 }
@@ -89,7 +87,7 @@ fn schedule(scene: &Scene) -> Table {
     let mut table = Table::new("schedule", "Schedule of the ports, by cycle of the interval");
     for variant in &scene.variants {
         for ports in PortAccount::new(variant).arrays {
-            let mut slots = ports.schedule().slots;
+            let mut slots = Schedule::new(&ports).slots;
             slots.sort_by_key(|slot| (slot.copy, slot.cycle, slot.phase, slot.port));
             for pair in slots.chunks(2) {
                 let [first, ..] = pair else { continue };
@@ -114,8 +112,7 @@ fn schedule(scene: &Scene) -> Table {
     table.note(
         "Clock counts the block RAM's clocks within a cycle. Writes belong to an issue that \
          entered the pipeline earlier. Take: the last use of a body in the pass before, written \
-         into \
-         the memory of the next unit; at most two happen at once.",
+         into the memory of the next unit; at most two happen at once.",
     );
     table
 }

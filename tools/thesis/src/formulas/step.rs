@@ -41,25 +41,22 @@ fn cycles(scene: &Scene) -> Table {
         }
     }
     table.note(format!(
-        "One formula for every profile that runs one pass after the other: load + {} passes + \
-         fill + integration, the longer of poses in \
-         and results out, + its fill, from the last body in to the end of the step. A step that \
-         stalls on hazards takes longer.",
+        "One formula for every profile that runs one pass after the other: load + {} passes + fill \
+         + integration, the longer of poses in and results out, + its fill, from the last body in \
+         to the end of the step. A step that stalls on hazards takes longer.",
         scene.step.passes()
     ));
     if scene.variants.iter().any(|variant| Window::of(variant.profile).is_some()) {
         table.note(
             "Where the collisions stream once, all passes run in parallel: \"one pass\" has the \
              cycles of all passes, and \"fill\" is the lag of the last pass behind the first. Load \
-             and integration run in \
-             parallel, too.",
+             and integration run in parallel, too.",
         );
     }
     table.note(
         "Packed: numbers without padding, as the thesis counts them. Streamed: beats and padding \
          as they travel; a result has position, orientation and both velocities, 13 numbers where \
-         the \
-         thesis counts 6.",
+         the thesis counts 6.",
     );
     table
 }
@@ -104,8 +101,7 @@ fn times(scene: &Scene) -> Table {
         "17.07 GB/s is the peak of the ZCU102 preset, 12.8 GB/s what a published measurement \
          sustains. The thesis states 16 GB/s for its memory (§5.4.2), a pass of its float design \
          needs 15.4, and its times contain no wait for memory. The 2,062,697 cycles of its float \
-         design \
-         at 275 MHz are 7.501 ms where it prints 7.49.",
+         design at 275 MHz are 7.501 ms where it prints 7.49.",
     );
     table
 }

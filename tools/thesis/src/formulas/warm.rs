@@ -34,8 +34,7 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     table.note(
         "Applied at each collision's own turn in the first pass, impulses cost next to nothing and \
          do not hold a pile: a row is solved before its neighbours' impulses are in, and takes its \
-         own \
-         back.",
+         own back.",
     );
     if table.rows.is_empty() { Vec::new() } else { vec![table] }
 }

@@ -121,8 +121,7 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
             format!(
                 "{}: {left} % of the lookup tables are left for places, scoreboard, delay lines \
                  and DMAs, which this table does not count. Only a synthesis can tell whether that \
-                 is \
-                 enough, and whether it closes timing.",
+                 is enough, and whether it closes timing.",
                 variant.profile.name
             )
         } else {
@@ -131,8 +130,7 @@ fn logic(designs: &[(&Variant, &Window)]) -> Table {
     }
     table.note(
         "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one \
-         unit of \
-         each kind, and its logic is multiplied by the number of units.",
+         unit of each kind, and its logic is multiplied by the number of units.",
     );
     table
 }

@@ -65,8 +65,7 @@ pub(super) fn add(
         lines(Axis::linear("issue slot"), Axis::log("bodies alive"), &series),
         format!(
             "A body is alive from its first collision to its last. The step is {step}; the thesis' \
-             own is \
-             not published, and its Algorithm 3 does not say how ties are broken.",
+             own is not published, and its Algorithm 3 does not say how ties are broken.",
         ),
     );
     let moving = input.moving.iter().filter(|moving| **moving).count();

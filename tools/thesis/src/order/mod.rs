@@ -14,9 +14,9 @@ use scene::Grid;
 use serde_json::json;
 use zynq_pgs::order::{IssueWindow, OrderError};
 
-use self::rows::Measured as Rows;
+use self::rows::Measured;
 use self::source::Source;
-use crate::experiment::{Boards, Measured, Part, shown};
+use crate::experiment::{Boards, Experiment, Part, given, shown};
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 
@@ -35,12 +35,13 @@ The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the o
 GPU, this order is measured, too.";
 
 /// The experiment.
-pub(crate) static ORDER: Measured<OrderArgs> = Measured {
+pub(crate) static ORDER: Experiment = Experiment {
     id: "order",
     thesis: "§4.7, Algorithm 3",
     about: "The cost of each order of the collisions: hazards, empty slots, live bodies, host time",
     boards: Boards::Any,
-    run: measure,
+    arguments: OrderArgs::augment_args,
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.
@@ -143,7 +144,7 @@ fn refused(error: OrderError) -> Failure {
     Failure::input(error).next("`pgs solve` tells more about refused input")
 }
 
-fn table(measured: &Rows) -> Table {
+fn table(measured: &Measured) -> Table {
     let mut table = Table::new("orders", "The cost of each order");
     let count = |number: usize| Cell::Whole(number as u64);
     for row in &measured.rows {

@@ -12,13 +12,12 @@ const STYLE: &str = include_str!("page.css");
 
 pub(super) fn html(report: &Report) -> String {
     let mut text = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>zynq-pgs: the thesis' figures from our own numbers</title>\n\
-         <style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n\
-         <h1>The thesis' figures, from our own numbers</h1>\n<p>{}</p>\n<ul class=\"legend\">\n",
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta \
+         name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta \
+         name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" \
+         href=\"data:,\">\n<title>zynq-pgs: the thesis' figures from our own \
+         numbers</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>The thesis' \
+         figures, from our own numbers</h1>\n<p>{}</p>\n<ul class=\"legend\">\n",
         escaped(&preface(report))
     );
     for origin in Origin::ALL {

@@ -94,13 +94,12 @@ fn run(id: &str, words: &[String], session: &Session) -> Result<(String, Part), 
         Failure::new(Cause::Input, format!("{command} is refused: {error}"))
     };
     let all = experiments();
-    let experiment = all.iter().find(|each| each.id() == id);
+    let experiment = all.iter().find(|each| each.id == id);
     let experiment = experiment.ok_or_else(|| refused(&"there is no such experiment"))?;
-    let matches = experiment
-        .arguments(Command::new(experiment.id()))
+    let matches = (experiment.arguments)(Command::new(experiment.id))
         .try_get_matches_from(std::iter::once(&id.to_owned()).chain(words))
         .map_err(|error| refused(&error))?;
-    let part = experiment.run(&matches, session)?;
+    let part = (experiment.run)(&matches, session)?;
     Ok((command, part))
 }
 

@@ -8,7 +8,7 @@ use zynq_pgs_view::Recording;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
 
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::figure::Figure;
 use crate::session::Session;
 use pgs_command::board;
@@ -22,12 +22,13 @@ use pgs_command::pile;
 const EVERY: u32 = 2;
 
 /// The experiment.
-pub(crate) static PILE: Measured<Options> = Measured {
+pub(crate) static PILE: Experiment = Experiment {
     id: "pile",
     thesis: "§4.3, Figure 4.1",
     about: "The cubes after their fall, and the collisions of their heaviest step",
     boards: Boards::Own,
-    run: measure,
+    arguments: Options::augment_args,
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.

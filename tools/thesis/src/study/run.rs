@@ -3,11 +3,11 @@
 use scene::{Scene, kinetic_energy};
 use zynq_pgs::{Body, Collision, Shape, StepParameters, StepReport};
 
-use super::start::Start;
 use crate::permutation::{Arranger, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
+use pgs_command::step_input;
 use step_folder::folder::Folder;
 
 /// The bodies and collisions of a run.
@@ -32,6 +32,15 @@ impl World<'_> {
             Self::Scene(scene) => scene.shapes(),
             Self::Folder { folder, .. } => &folder.shapes,
         }
+    }
+
+    /// Makes a failure of the driver's error; for a folder, with the array at fault.
+    pub(crate) fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
+        let folder = match self {
+            Self::Scene(_) => None,
+            Self::Folder { folder, .. } => Some(*folder),
+        };
+        step_input::failure(folder, opened, error)
     }
 
     /// The collisions of the next step; a folder's are the same at any time.
@@ -85,7 +94,6 @@ impl<'a> Run<'a> {
         opened: &mut OpenBoard,
         parameters: &StepParameters,
         session: &Session,
-        start: &Start<'_>,
     ) -> Result<bool, Failure> {
         if session.is_interrupted() {
             return Ok(false);
@@ -100,7 +108,7 @@ impl<'a> Run<'a> {
                 Ok(true)
             }
             Err(error) if board::is_cancelled(&error) => Ok(false),
-            Err(error) => Err(start.failure(opened, error)),
+            Err(error) => Err(self.world.failure(opened, error)),
         }
     }
 
@@ -132,7 +140,7 @@ impl<'a> Run<'a> {
     }
 
     /// J.
-    pub(super) fn kinetic_energy(&self, start: &Start<'_>) -> f64 {
-        kinetic_energy(self.bodies(), start.shapes())
+    pub(super) fn kinetic_energy(&self) -> f64 {
+        kinetic_energy(self.bodies(), self.world.shapes())
     }
 }

@@ -17,7 +17,7 @@ use yardstick::Yardstick;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::figure::{Figure, bars};
 use crate::index::Row;
 use crate::session::Session;
@@ -46,13 +46,14 @@ Whole step: 1 / ((1 - p) + p / s) (thesis eq. 6.5), with s the factor of the res
 share: the thesis' 0.6, or the measured one.";
 
 /// The experiment.
-pub(crate) static SPLIT: Measured<Options> = Measured {
+pub(crate) static SPLIT: Experiment = Experiment {
     id: "split",
     thesis: "§4.4, equation 6.5",
     about: "The shares of collision search and response in a step, and what a faster response \
         gains",
     boards: Boards::Any,
-    run: |options, session| Ok(measure(options, session)?.part()),
+    arguments: Options::augment_args,
+    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
 };
 
 /// Its arguments.
@@ -269,8 +270,7 @@ impl Outcome {
         let (bodies, collisions) = (grouped(*bodies as u64), grouped(*collisions as u64));
         let pile = format!(
             "{grid} cubes dropped from {drop_m} m: {bodies} bodies, {collisions} collisions, \
-             median of \
-             {} steps, one thread",
+             median of {} steps, one thread",
             samples.len()
         );
         let tables = self.median.iter().flat_map(|times| [times.table(), self.of_gains()]);
@@ -280,8 +280,7 @@ impl Outcome {
         if let Some((times, [least, most])) = self.median.as_ref().zip(self.response_share_range) {
             let text = format!(
                 "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); \
-                 thesis \
-                 {:.0} % (recorded)",
+                 thesis {:.0} % (recorded)",
                 100.0 * times.response_share(),
                 100.0 * least,
                 100.0 * most,
@@ -309,8 +308,7 @@ impl Outcome {
             ),
             format!(
                 "a pile of {} cubes, in processor time of one thread of this host. The thesis \
-                 names \
-                 neither its processor nor its program for the shares.",
+                 names neither its processor nor its program for the shares.",
                 self.grid
             ),
         );

@@ -1,13 +1,12 @@
 //! Figures 5.1 and 5.2: a step without a pipeline and with one, on the channels of the board.
 
-use clap::Args;
 use pgs_interface::profile::{FLOAT, NAIVE, Profile};
 use scene::{Grid, Scene, SceneOptions};
 use step_trace::TracedStep;
 use zynq_pgs::StepParameters;
 use zynq_pgs::emulation::Build;
 
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part};
 use crate::figure::Figure;
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
@@ -17,17 +16,14 @@ use pgs_command::options::build::described;
 use pgs_command::options::scenes::DROP;
 
 /// The experiment.
-pub(crate) static STAGES: Measured<Options> = Measured {
+pub(crate) static STAGES: Experiment = Experiment {
     id: "stages",
     thesis: "§5.1.1, Figures 5.1 and 5.2",
     about: "The stages of a step without a pipeline, and with one",
     boards: Boards::Own,
+    arguments: |command| command,
     run: |_, session| measure(&session.emulated()),
 };
-
-/// It has no arguments.
-#[derive(Debug, Clone, Args)]
-pub(crate) struct Options {}
 
 /// Steps before the recorded one: the cubes have landed.
 const STEPS: u32 = 40;

@@ -97,8 +97,7 @@ pub const TABLES: [DataTable; 6] = [
         remarks: &[
             "The row after the reduction says 28 words a collision, its total counts 27: with 28 \
              it would be 3,789,280. The record that is streamed has the 28th, the number of \
-             contact \
-             points.",
+             contact points.",
         ],
     },
     DataTable {

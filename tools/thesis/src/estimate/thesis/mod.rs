@@ -8,7 +8,7 @@ pub mod data;
 pub mod euler;
 pub mod recorded;
 
-use super::cycles::StepShape;
+use super::step::StepShape;
 
 /// Bodies of the thesis' step: the moving ones.
 pub const BODIES: u64 = 38_880;

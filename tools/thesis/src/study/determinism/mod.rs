@@ -13,7 +13,7 @@ use super::run::Run;
 use super::spread::Spread;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving};
-use crate::experiment::{Boards, Measured};
+use crate::experiment::{Boards, Experiment, given};
 use crate::histogram::Histogram;
 use crate::permutation::Permutation;
 use crate::session::Session;
@@ -44,12 +44,13 @@ velocity is within 1 % if it differs by at most 1 % of the original's component.
 kinetic.";
 
 /// The experiment.
-pub(crate) static ORDERS: Measured<Options> = Measured {
+pub(crate) static ORDERS: Experiment = Experiment {
     id: "determinism",
     thesis: "§4.5, §4.6.3, Figures 4.2 and 4.9",
     about: "The same steps with collisions in different orders",
     boards: Boards::Any,
-    run: |options, session| Ok(measure(options, session)?.part()),
+    arguments: Options::augment_args,
+    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
 };
 
 /// Its arguments.
@@ -226,7 +227,7 @@ fn compare(
     let mut complete = true;
     for step in 1..=start.steps {
         // The run as given, which is the second, meets refused input first and names its place.
-        let mut taken = |run: &mut Run<'_>| run.step(opened, &start.parameters, session, start);
+        let mut taken = |run: &mut Run<'_>| run.step(opened, &start.parameters, session);
         if !(taken(&mut runs.1)? && taken(&mut runs.0)?) {
             complete = false;
             break;
@@ -234,7 +235,7 @@ fn compare(
         curve.push(Point {
             step,
             state: StateDeviation::of(runs.0.bodies(), runs.1.bodies(), &moving),
-            kinetic_energy_j: [runs.0.kinetic_energy(start), runs.1.kinetic_energy(start)],
+            kinetic_energy_j: [runs.0.kinetic_energy(), runs.1.kinetic_energy()],
         });
     }
     let histogram = |field: fn(&Body) -> [f32; 3]| {

@@ -73,8 +73,7 @@ impl Outcome {
             lines(Axis::linear("step"), Axis::log("mean deviation (eq. 4.1), %"), &series),
             format!(
                 "{}: the runs differ by the order of their collisions alone, and the GPU's order \
-                 is {}. \
-                 The thesis does not say after how many steps its snapshots were taken.",
+                 is {}. The thesis does not say after how many steps its snapshots were taken.",
                 self.subject,
                 self.source()
             ),
@@ -105,8 +104,7 @@ impl Outcome {
             format!(
                 "Both orders are solved on the emulated board: no GPU takes part. {}, the GPU's \
                  order {}; {falls}. A step moves a body by centimetres, its position is metres: \
-                 one step leads to \
-                 less than the thesis' figures.",
+                 one step leads to less than the thesis' figures.",
                 self.subject,
                 self.source()
             ),
@@ -118,8 +116,7 @@ impl Outcome {
         let of = self.over_pairs.last()?.position_mean_percent;
         let [low, high] = TWO_GPU_RUNS.mean_percent;
         let subject = "mean deviation of positions between two random orders; the thesis compares \
-            two \
-                       executions on the GPU";
+            two executions on the GPU";
         let ours = match self.pairs.len() {
             1 => format!("{:.4} %", of.mean),
             pairs => format!("{:.4} ± {:.4} % ({pairs} pairs)", of.mean, of.standard_deviation),

@@ -15,13 +15,11 @@ fn meaning(build: &str) -> Option<&'static str> {
         "half,thesis16" => {
             "half,thesis16 has the thesis' own sixteen bits (§4.6.4): the top bit and the four low \
              bits of the exponent, ten of the mantissa by truncation, and no zero; smaller numbers \
-             become the \
-             smallest"
+             become the smallest"
         }
         "half,thesis16-literal" => {
             "half,thesis16-literal takes the thesis' encoder literally, which cuts three bits out \
-             of the \
-             exponent whatever they are, so that small numbers read as large ones"
+             of the exponent whatever they are, so that small numbers read as large ones"
         }
         _ => return None,
     })

@@ -18,7 +18,7 @@ use super::recorded::{HALF_AGAINST_FLOAT, RecordedDeviation};
 use super::run::Run;
 use super::start::{Start, StartArgs};
 use crate::deviation::{StateDeviation, components, moving, unmoved_share};
-use crate::experiment::{Boards, Measured};
+use crate::experiment::{Boards, Experiment, given};
 use crate::histogram::Histogram;
 use crate::narrow::{NarrowFormat, carried};
 use crate::session::Session;
@@ -45,12 +45,13 @@ exponent is that of the largest number; bits are cut off as in the thesis' forma
 the range become the smallest one. No board is built with them.";
 
 /// The experiment.
-pub(crate) static HALF: Measured<Options> = Measured {
+pub(crate) static HALF: Experiment = Experiment {
     id: "half",
     thesis: "§4.6, Figure 4.10",
     about: "Sixteen bits beside float",
     boards: Boards::Own,
-    run: |options, session| Ok(measure(options, session)?.part()),
+    arguments: Options::augment_args,
+    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
 };
 
 /// Its arguments.
@@ -189,7 +190,7 @@ impl<'a> Side<'a> {
     ) -> Result<Option<f64>, Failure> {
         let before = self.run.bodies().to_vec();
         let taken = match (&mut self.opened, self.poses) {
-            (Some(opened), _) => self.run.step(opened, &start.parameters, session, start)?,
+            (Some(opened), _) => self.run.step(opened, &start.parameters, session)?,
             (None, Some(format)) => self.run.step_by(session, |bodies, collisions| {
                 words::step(format, bodies, start.shapes(), collisions, &start.parameters)
             })?,
@@ -220,28 +221,28 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         let build = build.to_string();
         builds.push(OfBuild { build, curve: Vec::new(), position_histogram: None, failed: None });
     }
-    let mut energies = vec![float.run.kinetic_energy(start)];
+    let mut energies = vec![float.run.kinetic_energy()];
     let mut unmoved = Vec::new();
     'steps: for step in 1..=start.steps {
         let Some(share) = float.step(start, &moving, session)? else {
             complete = false;
             break;
         };
-        let energy = float.run.kinetic_energy(start);
+        let energy = float.run.kinetic_energy();
         energies.push(energy);
         unmoved.push(share);
         for (place, of_build) in sides.iter_mut().zip(&mut builds) {
             let Some(side) = place else { continue };
             match side.step(start, &moving, session) {
                 Ok(Some(share)) => {
-                    of_build.curve.push(point(
+                    let kinetic_energy_j = side.run.kinetic_energy();
+                    of_build.curve.push(Point {
                         step,
-                        (&float.run, energy),
-                        &side.run,
-                        share,
-                        start,
-                        &moving,
-                    ));
+                        state: StateDeviation::of(float.run.bodies(), side.run.bodies(), &moving),
+                        kinetic_energy_j,
+                        energy_ratio: (energy > 0.0).then(|| kinetic_energy_j / energy),
+                        unmoved_share: share,
+                    });
                 }
                 Ok(None) => {
                     complete = false;
@@ -277,22 +278,4 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         start_text: start.text(),
         subject: start.subject(),
     })
-}
-
-fn point(
-    step: u32,
-    (float, float_energy): (&Run<'_>, f64),
-    run: &Run<'_>,
-    unmoved_share: f64,
-    start: &Start<'_>,
-    moving: &[bool],
-) -> Point {
-    let kinetic_energy_j = run.kinetic_energy(start);
-    Point {
-        step,
-        state: StateDeviation::of(float.bodies(), run.bodies(), moving),
-        kinetic_energy_j,
-        energy_ratio: (float_energy > 0.0).then(|| kinetic_energy_j / float_energy),
-        unmoved_share,
-    }
 }

@@ -9,7 +9,7 @@ mod designs;
 mod show;
 
 use crate::estimate::{StepShape, thesis};
-use crate::experiment::{Boards, Measured};
+use crate::experiment::{Boards, Experiment, given};
 use clap::Args;
 
 use self::designs::designs;
@@ -30,12 +30,13 @@ the arrays were partitioned, and not how they were before). Before the reduction
 to read the 56 words of Table 4.1.";
 
 /// The experiment.
-pub(crate) static LADDER: Measured<Options> = Measured {
+pub(crate) static LADDER: Experiment = Experiment {
     id: "ladder",
     thesis: "Chapter 5",
     about: "The designs of chapter 5, from register accesses to sixteen bits",
     boards: Boards::None,
-    run: |options, _| Ok(measure(options).part()),
+    arguments: Options::augment_args,
+    run: |args, _| Ok(measure(&given(args)?).part()),
 };
 
 /// Its arguments.

@@ -20,7 +20,7 @@ use zynq_pgs::order::Order;
 use self::passes::Course;
 pub(crate) use self::passes::Pass;
 use self::residual::Problem;
-use crate::experiment::{Boards, Measured, Part};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use crate::study::given::GivenStep;
 use pgs_command::board;
@@ -51,13 +51,15 @@ passes leave a residual that they never remove: --spin-damping 0 takes it out.";
 const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 
 /// The experiment.
-pub(crate) static STOPPING: Measured<Options> = Measured {
+pub(crate) static STOPPING: Experiment = Experiment {
     id: "stopping",
     thesis: "§2.2.3",
     about: "One step with 0, 1, 2 ... passes, and what is left to solve",
     boards: Boards::Any,
-    run: |options, session| {
-        Ok(measure(options, session)?.map_or_else(Part::interrupted, |outcome| outcome.part()))
+    arguments: Options::augment_args,
+    run: |args, session| {
+        Ok(measure(&given(args)?, session)?
+            .map_or_else(Part::interrupted, |outcome| outcome.part()))
     },
 };
 

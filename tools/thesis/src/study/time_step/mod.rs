@@ -11,7 +11,7 @@ use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
-use crate::experiment::{Boards, Measured};
+use crate::experiment::{Boards, Experiment, given};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
@@ -40,12 +40,13 @@ const THROWN: [f32; 3] = [3.0, 8.0, 0.0];
 const HEIGHT: f32 = 50.0;
 
 /// The experiment.
-pub(crate) static TIME_STEP: Measured<Options> = Measured {
+pub(crate) static TIME_STEP: Experiment = Experiment {
     id: "time-step",
     thesis: "§2.1.1, Figure 2.2",
     about: "A body in flight and a pile with time steps from 1/480 s to 1/15 s",
     boards: Boards::Any,
-    run: |options, session| Ok(measure(options, session)?.part()),
+    arguments: Options::augment_args,
+    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
 };
 
 /// Its arguments.

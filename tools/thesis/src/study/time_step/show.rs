@@ -79,8 +79,7 @@ impl Outcome {
             lines(Axis::linear("time step, ms"), Axis::log("error in mm, cost in ms"), &series),
             format!(
                 "{} s of a pile of {} cubes. A shorter step costs more board time (modelled) a \
-                 simulated \
-                 second, and leaves smaller errors (measured).",
+                 simulated second, and leaves smaller errors (measured).",
                 self.seconds, self.grid
             ),
         );
