@@ -42,8 +42,8 @@ impl EmulatedBoard {
         Ok(Self::of(config, Memory::of(&config), None))
     }
 
-    /// Builds a board on external memory, around another accelerator if there is one. The device may
-    /// touch the granted ranges only. Such a board allocates no memory itself.
+    /// Builds a board on external memory, around another accelerator if there is one. The device
+    /// may touch the granted ranges only. Such a board allocates no memory itself.
     ///
     /// # Errors
     /// [`ConfigError`] if a number is outside its range.

@@ -1,11 +1,12 @@
-//! The reference solver on plain data: a step of the specification (§7) without streams, registers or a
-//! clock, in the arithmetic of either precision.
+//! The reference solver on plain data: a step of the specification (§7) without streams, registers
+//! or a clock, in the arithmetic of either precision.
 
 use crate::accelerator::arithmetic::inertia::Isotropic;
 use crate::accelerator::arithmetic::number::{Format, Half, Number, Single};
-use crate::accelerator::integrate::{Integration, Pose, integrate};
+use crate::accelerator::integrate::{Integration, integrate};
 use crate::accelerator::records::decode;
-use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters, Velocity};
+use crate::accelerator::solver::{self, Impulses, Mass, SolverParameters};
+use crate::accelerator::state::{Pose, Velocity};
 use pgs_interface::number::Precision;
 use pgs_interface::record::CONTACT_POINTS;
 

@@ -51,16 +51,17 @@ pub mod flags {
     /// Bodies of inverse mass 0 have the velocity of their record. Without it they are at rest,
     /// whatever the record holds.
     pub const KINEMATIC: Field = Field::bit("kinematic", 1, Access::ReadWrite);
-    /// The friction of a collision is above its contact count, and FRICTION is not used. Only where a record has
-    /// room for it ([`Variant::has_pair_friction`](super::super::profile::Variant::has_pair_friction)).
+    /// The friction of a collision is above its contact count, and FRICTION is not used. Only where
+    /// a record has room for it
+    /// ([`Variant::has_pair_friction`](super::super::profile::Variant::has_pair_friction)).
     pub const PAIR_FRICTION: Field = Field::bit("pair_friction", 2, Access::ReadWrite);
     /// Impulses come in with the collisions, in a pass of their own in front of the passes of each
     /// kind.
     pub const WARM_START: Field = Field::bit("warm_start", 3, Access::ReadWrite);
     /// The impulses go out in front of the results.
     pub const IMPULSES_OUT: Field = Field::bit("impulses_out", 4, Access::ReadWrite);
-    /// Each velocity record brings the inverse mass of its body, and the shape table is not used. Only
-    /// in a bitstream with [`features::WORLD_INERTIA`](super::features::WORLD_INERTIA).
+    /// Each velocity record brings the inverse mass of its body, and the shape table is not used.
+    /// Only in a bitstream with [`features::WORLD_INERTIA`](super::features::WORLD_INERTIA).
     pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 5, Access::ReadWrite);
 }
 
@@ -339,7 +340,8 @@ pub const NUMBERS: Register = read_only(
         numbers::POSES,
     ],
 );
-/// First byte of the [`Fence`](super::fence::Fence), in units of [`FENCE_UNIT`](super::fence::FENCE_UNIT).
+/// First byte of the [`Fence`](super::fence::Fence), in units of
+/// [`FENCE_UNIT`](super::fence::FENCE_UNIT).
 pub const FENCE_BASE: Register = read_only("FENCE_BASE", 0x150, &[]);
 /// Length of the fence, in the same units; 0: there is none.
 pub const FENCE_SIZE: Register = read_only("FENCE_SIZE", 0x154, &[]);

@@ -22,8 +22,8 @@
 //! the second asks for the memory. Both come within seconds: from then on the driver has the board,
 //! and may take its time. The board answers every other hello with busy meanwhile.
 //!
-//! The memory is a new `memfd` for each connection, which comes beside the answer (`SCM_RIGHTS`). Its
-//! length is the announced one, for good: it is sealed with `F_SEAL_SHRINK`, `F_SEAL_GROW` and
+//! The memory is a new `memfd` for each connection, which comes beside the answer (`SCM_RIGHTS`).
+//! Its length is the announced one, for good: it is sealed with `F_SEAL_SHRINK`, `F_SEAL_GROW` and
 //! `F_SEAL_SEAL`. Byte 0 has the bus address of the answer.
 
 use std::time::Duration;

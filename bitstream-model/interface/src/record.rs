@@ -3,8 +3,8 @@
 //! A record is rows of four words, (vec3, word); lane 0 is bits 31:0, at the lowest address. In f32
 //! a row is a beat. In sixteen bits a row is half a beat, the first of two in bits 63:0, and the
 //! rows of an array follow each other without a gap: a collision of seven rows takes three beats
-//! and a half. In a warm pass the rows of the impulses lie behind all other rows of the collisions that
-//! are issued together.
+//! and a half. In a warm pass the rows of the impulses lie behind all other rows of the collisions
+//! that are issued together.
 //!
 //! ```text
 //!                lane 0   lane 1   lane 2   lane 3
@@ -65,8 +65,8 @@ pub mod velocity {
     pub const ANGULAR: usize = 1;
     /// Rows of a record with world inertia.
     pub const WORLD_ROWS: usize = 4;
-    /// Diagonal of the inverse inertia: xx, yy, zz; the word beside it is the inverse mass in steps with
-    /// streamed masses, else 0.
+    /// Diagonal of the inverse inertia: xx, yy, zz; the word beside it is the inverse mass in steps
+    /// with streamed masses, else 0.
     pub const DIAGONAL: usize = 2;
     /// The rest of the inverse inertia: xy, xz, yz; the word beside it is 0.
     pub const OFF_DIAGONAL: usize = 3;

@@ -38,8 +38,8 @@ impl Stripes {
     }
 }
 
-/// The S2MM stream on which impulses go out: a beat for each collision in the packet of the results, in
-/// front of them.
+/// The S2MM stream on which impulses go out: a beat for each collision in the packet of the
+/// results, in front of them.
 pub const IMPULSES_STREAM: usize = 0;
 
 /// The stripes of a profile.

@@ -7,7 +7,7 @@
 //! Where two write-backs to one body overlap, the later one wins and the earlier impulse is lost.
 //! Static bodies never change and are no hazard.
 
-use super::solver::Velocity;
+use super::state::Velocity;
 use crate::cast::index;
 use crate::config::Hazards;
 

@@ -4,15 +4,8 @@
 
 use super::arithmetic::number::{Format, Number};
 use super::arithmetic::vector::Vec3;
-use super::solver::Velocity;
+use super::state::{Pose, Velocity};
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW, SERIES_TERM};
-
-/// Position and orientation of a body.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pose {
-    pub(crate) position: [f32; 3],
-    pub(crate) orientation: [f32; 4],
-}
 
 /// Parameters of the integration.
 #[derive(Debug, Clone, Copy, Default)]

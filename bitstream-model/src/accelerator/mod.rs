@@ -24,6 +24,7 @@ pub(crate) mod per_record;
 mod phases;
 pub(crate) mod records;
 pub(crate) mod solver;
+pub(crate) mod state;
 
 use crate::cast::register;
 use crate::config::BoardConfig;
@@ -45,7 +46,8 @@ use hazards::Pipeline;
 use records::decode::Collision;
 use records::results::Results;
 use records::segment::Segment;
-use solver::{Impulses, Velocity};
+use solver::Impulses;
+use state::Velocity;
 
 /// Where a step stands.
 #[derive(Debug, Clone, Copy)]

@@ -3,11 +3,12 @@
 use super::Accelerator;
 use super::arithmetic::inertia;
 use super::arithmetic::number::{Format, Half, HalfFlushed, Number, Single, SingleFlushed};
-use super::integrate::{Pose, integrate};
+use super::integrate::integrate;
 use super::records::array::Row;
 use super::records::decode::{self, Collision};
 use super::records::segment::{Beats, PacketError, Reader};
-use super::solver::{self, Impulses, Mass, Velocity};
+use super::solver::{self, Impulses, Mass};
+use super::state::{Pose, Velocity};
 use crate::cast::register;
 use crate::config::Subnormals;
 use pgs_interface::control::{ErrorCode, IMPULSE_SUM_FRACTION_BITS};
@@ -21,7 +22,8 @@ fn to_fixed(value: f64) -> u64 {
     value as u64
 }
 
-/// The sum of a collision's normal impulses after the last contact pass, as the accumulator adds it.
+/// The sum of a collision's normal impulses after the last contact pass, as the accumulator adds
+/// it.
 #[inline]
 pub(crate) fn fixed_impulse<U: Format>(impulses: &Impulses) -> u64 {
     let sum = f64::from(solver::normal_sum::<U>(impulses));
@@ -178,7 +180,8 @@ impl Accelerator {
         *velocities = velocities.map(|velocity| self.stored_velocity(velocity));
     }
 
-    /// The pose and velocity that a body leaves with. `free` tells whether its inverse mass is not 0.
+    /// The pose and velocity that a body leaves with. `free` tells whether its inverse mass is not
+    /// 0.
     pub(super) fn integrated(
         &self,
         free: bool,

@@ -12,6 +12,7 @@ use super::arithmetic::inertia::{Inertia, Stored, Times};
 use super::arithmetic::number::{Format, Number};
 use super::arithmetic::vector::Vec3;
 use super::records::decode::Collision;
+use super::state::Velocity;
 use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -20,13 +21,6 @@ use pgs_interface::record::CONTACT_POINTS;
 pub(crate) struct Mass {
     pub(crate) inverse_mass: f32,
     pub(crate) inverse_inertia: Stored,
-}
-
-/// Velocities of a body, as they lie in block RAM.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Velocity {
-    pub(crate) linear: [f32; 3],
-    pub(crate) angular: [f32; 3],
 }
 
 /// Accumulated impulses of a collision, as they lie in block RAM: four normal impulses during the

@@ -116,7 +116,8 @@ impl Channel {
         matches!(self.work, Work::None)
     }
 
-    /// Whether the channel waits for beats, for space or for work, and no other change is due in it.
+    /// Whether the channel waits for beats, for space or for work, and no other change is due in
+    /// it.
     #[inline]
     pub(super) fn cannot_move(&self, stream: &Stream) -> bool {
         let waits = match self.direction {
@@ -334,8 +335,8 @@ impl Channel {
         true
     }
 
-    /// Changes the states that change by time alone; returns whether the channel has halted, which drops
-    /// its work.
+    /// Changes the states that change by time alone; returns whether the channel has halted, which
+    /// drops its work.
     pub(super) fn tick(&mut self, now: u64) -> bool {
         let due = self.transition.filter(|(at, _)| *at <= now);
         if let Some((_, what)) = due {

@@ -2,8 +2,8 @@
 //!
 //! `channel.rs` holds the registers of one channel and their side effects, `mover.rs` the engine
 //! that fetches descriptors and moves beats, `faults.rs` the effects of faults on both. Both
-//! directions are one piece of code. `chain.rs` is for [`fast`](crate::fast): the buffers of a whole chain,
-//! and a chain that passes at once.
+//! directions are one piece of code. `chain.rs` is for [`fast`](crate::fast): the buffers of a
+//! whole chain, and a chain that passes at once.
 //!
 //! Source: PG021 (v7.1); where it leaves a choice, the specification's table of behaviours.
 
@@ -260,8 +260,8 @@ impl Core {
         self.reset_until.is_none() && (self.mm2s.interrupt() || self.s2mm.interrupt())
     }
 
-    /// Moves up to `limit` beats of one channel until cycle `end`. Returns their number, and whether
-    /// any state changed.
+    /// Moves up to `limit` beats of one channel until cycle `end`. Returns their number, and
+    /// whether any state changed.
     #[inline]
     pub(crate) fn run(
         &mut self,

@@ -140,11 +140,11 @@ pub struct BoardConfig {
     pub delays: Delays,
     /// Mistakes in the build.
     pub quirks: Quirks,
-    /// Threads of the host for the fast way's arithmetic, with the caller's thread. They change no result
-    /// and no counter.
+    /// Threads of the host for the fast way's arithmetic, with the caller's thread. They change no
+    /// result and no counter.
     pub threads: usize,
-    /// Whether the board takes a step at once where its host waits for the whole of it. That changes no
-    /// result, and of the counters the cycles of waits alone.
+    /// Whether the board takes a step at once where its host waits for the whole of it. That
+    /// changes no result, and of the counters the cycles of waits alone.
     pub fast: bool,
 }
 

@@ -14,8 +14,8 @@
 //! record  4, 1 or 0, 0             1, or 0 from a simulator without waveforms
 //! ```
 //!
-//! The marks of a beat that was sent hold in bits 31:8 the clock of the request in which it was sent.
-//! `record` begins and ends a waveform in the file that is the program's fourth argument.
+//! The marks of a beat that was sent hold in bits 31:8 the clock of the request in which it was
+//! sent. `record` begins and ends a waveform in the file that is the program's fourth argument.
 //!
 //! `bitstream-model/rtl/simulator/main.cpp` is the other end, and `serve.rs` the same in Rust.
 
@@ -83,9 +83,9 @@ impl SimulatorProcess {
     /// treats subnormal numbers as the simulator does, has the fence that it reports.
     ///
     /// # Errors
-    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`] and
-    /// [`ExternalError::Inertia`] for a simulator that treats hazards in another way or was built for another
-    /// form of inertia; else as for [`start`](Self::start).
+    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`]
+    /// and [`ExternalError::Inertia`] for a simulator that treats hazards in another way or was
+    /// built for another form of inertia; else as for [`start`](Self::start).
     pub fn start_for(config: &mut BoardConfig, path: &Path) -> Result<Self, ExternalError> {
         if config.profile != &FLOAT {
             let (generated, asked) = (FLOAT.name, config.profile.name);
@@ -272,8 +272,8 @@ impl Drop for SimulatorProcess {
     fn drop(&mut self) {
         drop(self.requests.take());
         if !self.starter.is_this() {
-            // A forked child: the simulator goes on for the parent, whose reading thread may have had
-            // a lock of the channel.
+            // A forked child: the simulator goes on for the parent, whose reading thread may have
+            // had a lock of the channel.
             let (_, none) = mpsc::sync_channel(0);
             let _ = ManuallyDrop::new(mem::replace(&mut self.answers, none));
             return;

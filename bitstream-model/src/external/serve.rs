@@ -1,5 +1,5 @@
-//! The other end of [`SimulatorProcess`](super::SimulatorProcess) in Rust: serves an accelerator as a
-//! simulator serves the Verilog. Tests use it where no simulator can be built.
+//! The other end of [`SimulatorProcess`](super::SimulatorProcess) in Rust: serves an accelerator as
+//! a simulator serves the Verilog. Tests use it where no simulator can be built.
 
 use std::io::{self, Read, Write};
 

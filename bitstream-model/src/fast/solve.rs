@@ -17,7 +17,7 @@ use crate::accelerator::Accelerator;
 use crate::accelerator::hazards::Entry;
 use crate::accelerator::records::decode::{self, Collision};
 use crate::accelerator::records::segment::Reader;
-use crate::accelerator::solver::Velocity;
+use crate::accelerator::state::Velocity;
 use pgs_interface::number::Numbers;
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::{Beat, CONTACT_POINTS, collision};

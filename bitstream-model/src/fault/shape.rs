@@ -10,8 +10,8 @@ pub(crate) enum PassKind {
     Friction,
 }
 
-/// The solver of pass `number`, from 0, of a step with `contact` contact passes, and the number of the
-/// pass among its kind, from 1.
+/// The solver of pass `number`, from 0, of a step with `contact` contact passes, and the number of
+/// the pass among its kind, from 1.
 pub(crate) fn pass_of(number: u32, contact: u32) -> (PassKind, u32) {
     match number.checked_sub(contact) {
         None => (PassKind::Contact, number + 1),

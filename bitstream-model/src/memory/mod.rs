@@ -47,8 +47,8 @@ pub enum MemoryError {
     },
     /// The system has no room for the buffer.
     #[error(
-        "the system has no memory for a buffer of {bytes} bytes: free some, or raise the limit on it \
-         (ulimit -v)"
+        "the system has no memory for a buffer of {bytes} bytes: free some, or raise the limit on \
+         it (ulimit -v)"
     )]
     System {
         /// Bytes asked for.

@@ -1,8 +1,9 @@
-//! Records the course of a board's time on request: register accesses, beats, stages, the interrupt.
+//! Records the course of a board's time on request: register accesses, beats, stages, the
+//! interrupt.
 //!
-//! A board without a recorder pays for one look at an empty option a block of beats. A recorded board
-//! takes no stretch of time at once, so that each beat has a clock; bits, cycles and counters stay the
-//! same. A clock is the accelerator's, counted since the board was built.
+//! A board without a recorder pays for one look at an empty option a block of beats. A recorded
+//! board takes no stretch of time at once, so that each beat has a clock; bits, cycles and counters
+//! stay the same. A clock is the accelerator's, counted since the board was built.
 
 mod recorder;
 
@@ -118,8 +119,8 @@ impl PortState {
     }
 }
 
-/// A descriptor from its fetch to its status, or to the error, reset or end of the recording that cut
-/// it short.
+/// A descriptor from its fetch to its status, or to the error, reset or end of the recording that
+/// cut it short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DescriptorSpan {
     /// Its time.
@@ -132,8 +133,9 @@ pub struct DescriptorSpan {
     pub ended: bool,
 }
 
-/// A packet from its first beat to its last, or to the error, reset or end of the recording that cut it
-/// short. A packet that began before the recording is left out; its beats are states of the port.
+/// A packet from its first beat to its last, or to the error, reset or end of the recording that
+/// cut it short. A packet that began before the recording is left out; its beats are states of the
+/// port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PacketSpan {
     /// Its time.

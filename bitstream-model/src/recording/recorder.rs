@@ -88,8 +88,9 @@ pub(crate) struct Recorder {
     /// MM2S and S2MM of each core, in that order.
     channels: Vec<Channel>,
     waits: Vec<Span>,
-    /// The clock at which the accelerator has sent last. It works first in a slice of the board's time, and
-    /// the channels then move its beats from the begin of the slice on: no beat moves before it exists.
+    /// The clock at which the accelerator has sent last. It works first in a slice of the board's
+    /// time, and the channels then move its beats from the begin of the slice on: no beat moves
+    /// before it exists.
     sent_at: u64,
     level: bool,
     interrupt: Levels,

@@ -115,8 +115,8 @@ pub struct Server {
 impl Server {
     /// Builds a board, around another accelerator if there is one, and opens the socket. `memory`
     /// has the bus addresses of each driver's memory: a multiple of
-    /// [`MEMORY_UNIT`](pgs_interface::message::MEMORY_UNIT) bytes. It replaces the socket of a server
-    /// that was killed.
+    /// [`MEMORY_UNIT`](pgs_interface::message::MEMORY_UNIT) bytes. It replaces the socket of a
+    /// server that was killed.
     ///
     /// # Errors
     /// [`ServeError`].

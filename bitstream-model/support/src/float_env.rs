@@ -60,11 +60,11 @@ pub fn standard_around<R>(work: impl FnOnce(&Outside) -> R) -> R {
 /// The proof are the sticky flags of the processor:
 ///
 /// - x86-64: a subnormal operand raises the denormal flag, an inexact subnormal result underflow.
-/// An exact one raises nothing until   it is an operand; so the caller looks at the results that it
-/// hands on.
+///   An exact one raises nothing until it is an operand; so the caller looks at the results that
+///   it hands on.
 /// - aarch64: without flushing an exact subnormal result raises nothing, and neither does a
-/// subnormal operand.   So the work is done with FZ set: a flushed operand raises IDC, a flushed
-/// result UFC, also one that would   have been rounded up to a normal number.
+///   subnormal operand. So the work is done with FZ set: a flushed operand raises IDC, a flushed
+///   result UFC, also one that would have been rounded up to a normal number.
 /// - On other processors nothing is certain.
 pub fn without_subnormals<R>(watches: bool, work: impl FnOnce() -> R) -> (R, bool) {
     if !watches {

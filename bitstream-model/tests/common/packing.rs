@@ -237,8 +237,8 @@ pub(crate) fn result_beats(variant: &Variant, bodies: usize) -> Vec<usize> {
     dealt.iter().map(Vec::len).collect()
 }
 
-/// The bodies from the result beats of all streams. Shapes are not part of a result and read 0. The other
-/// beats are padding and must be zeros.
+/// The bodies from the result beats of all streams. Shapes are not part of a result and read 0. The
+/// other beats are padding and must be zeros.
 pub(crate) fn unpack(variant: &Variant, streams: &[Box<[Beat]>], bodies: usize) -> Vec<Body> {
     let format = variant.numbers.poses;
     let mut next: Vec<_> = streams.iter().map(|stream| stream.iter()).collect();

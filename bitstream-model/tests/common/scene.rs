@@ -51,11 +51,12 @@ pub(crate) struct Step {
     pub(crate) collisions: Vec<Collision>,
     /// The friction of each collision; without any, all have that of the step.
     pub(crate) frictions: Vec<f32>,
-    /// The impulses of each collision, normal and of friction, that a warm start begins with; without
-    /// any there is none.
+    /// The impulses of each collision, normal and of friction, that a warm start begins with;
+    /// without any there is none.
     pub(crate) impulses: Vec<[[f32; 4]; 2]>,
     pub(crate) impulses_out: bool,
-    /// The inverse mass that each body brings with its world inertia; without any, all have their shape's.
+    /// The inverse mass that each body brings with its world inertia; without any, all have their
+    /// shape's.
     pub(crate) masses: Vec<f32>,
     /// Contact and friction passes.
     pub(crate) iterations: [u32; 2],

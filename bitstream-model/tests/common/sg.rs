@@ -285,7 +285,8 @@ impl Machine {
         flight
     }
 
-    /// Whether the accelerator sets `ap_done`, which may come some hundred cycles after the results.
+    /// Whether the accelerator sets `ap_done`, which may come some hundred cycles after the
+    /// results.
     pub(crate) fn is_done(&self) -> bool {
         (0..16).any(|_| {
             let done = ap_ctrl::DONE.is_set(self.host.control(control::AP_CTRL));

@@ -1,4 +1,5 @@
-//! The fence of a board: every DMA master meets a decode error outside it, and touches no memory there.
+//! The fence of a board: every DMA master meets a decode error outside it, and touches no memory
+//! there.
 
 use bitstream_model::{
     BoardConfig, Denied, DeviceAccess, Direction, Master, Quirks, ViolationKind,

@@ -371,7 +371,8 @@ proptest! {
         }
     }
 
-    /// A warm step on `half` gives the bits of `float`, whose impulses are rounded to binary16 before.
+    /// A warm step on `half` gives the bits of `float`, whose impulses are rounded to binary16
+    /// before.
     #[test]
     fn impulses_that_come_in_sixteen_bits_are_solved_as_those_of_float(step in warm_scene()) {
         let words = received(&step, BINARY16, BINARY16);

@@ -1,4 +1,5 @@
-//! Tests of the emulated board as a driver sees it: registers, descriptors, memory and the interrupt.
+//! Tests of the emulated board as a driver sees it: registers, descriptors, memory and the
+//! interrupt.
 //!
 //! One program, as each more would be linked with all of the crate.
 

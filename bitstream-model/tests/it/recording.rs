@@ -186,7 +186,8 @@ fn a_stream_without_room_shows_a_sender_that_waits() {
     assert!(channels[0].port.iter().any(|state| waits(&state.port)));
 }
 
-/// A machine that records; a step has failed on it, at beat 17 of the second contact pass on MM2S 2.
+/// A machine that records; a step has failed on it, at beat 17 of the second contact pass on MM2S
+/// 2.
 fn failed() -> Machine {
     let config = BoardConfig { strict: false, ..board(&FLOAT, Bandwidth::Unlimited) };
     let mut machine = Machine::new(config);
@@ -215,8 +216,8 @@ fn a_step_that_fails_is_recorded_to_its_end() {
     assert_packets_have_their_beats(&recording);
 }
 
-/// Asserts that the beats of the ports within each packet are the packet's, and that no packet begins before
-/// the last one has ended.
+/// Asserts that the beats of the ports within each packet are the packet's, and that no packet
+/// begins before the last one has ended.
 fn assert_packets_have_their_beats(recording: &Recording) {
     for channel in &recording.channels {
         let mut at = recording.span.begin;

@@ -56,8 +56,9 @@ typedef enum zpgs_status {
     // The library met a mistake of its own: close the accelerator. Every later call with the same
     // accelerator ends like this, too.
     ZPGS_STATUS_PANIC = 11,
-    // The call came from a child that was forked since `zpgs_open`: the accelerator is its parent's, and
-    // nothing was done. Open one after the fork. `zpgs_close` frees memory of the child alone.
+    // The call came from a child that was forked since `zpgs_open`: the accelerator is its
+    // parent's, and nothing was done. Open one after the fork. `zpgs_close` frees memory of the
+    // child alone.
     ZPGS_STATUS_FORKED = 12,
 } zpgs_status;
 
@@ -127,7 +128,8 @@ typedef struct zpgs_parameters {
     uint32_t deadline_ms;
     // Number of repetitions of a step that failed, each after a reset. `zpgs_submit` ignores it.
     uint32_t retries;
-    // Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each kind.
+    // Flag: begin with the impulses of `zpgs_collisions` or `zpgs_push`, in one more pass of each
+    // kind.
     uint32_t warm_start;
     // Flag: keep the impulses of the step for `zpgs_read_impulses`.
     uint32_t impulses_out;
@@ -157,8 +159,9 @@ typedef struct zpgs_strided_const {
 // frame.
 //
 // During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
-// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with another
-// of its arguments. Elements of several arrays may alternate, as those of an array of structures do.
+// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with
+// another of its arguments. Elements of several arrays may alternate, as those of an array of
+// structures do.
 typedef struct zpgs_bodies {
     // Size of the structure, as the caller's header has it.
     size_t size;
@@ -178,7 +181,8 @@ typedef struct zpgs_bodies {
 
 // The collisions of a step, in the caller's own memory.
 //
-// During a call no thread writes them. A step refuses them where they share a byte with the bodies.
+// During a call no thread writes them. A step refuses them where they share a byte with the
+// bodies.
 typedef struct zpgs_collisions {
     // Size of the structure, as the caller's header has it.
     size_t size;
@@ -186,8 +190,8 @@ typedef struct zpgs_collisions {
     size_t count;
     // The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     struct zpgs_strided_const collisions;
-    // The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each collision.
-    // Null without a warm start.
+    // The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each
+    // collision. Null without a warm start.
     struct zpgs_strided_const impulses;
 } zpgs_collisions;
 
@@ -243,8 +247,8 @@ typedef struct zpgs_collision {
 
 // The impulses of a collision, accumulated over the passes of a step, N s.
 typedef struct zpgs_impulses {
-    // Along the normal, at each contact point; positive pushes body A along the normal. The elements
-    // behind the number of points come out as 0 and are ignored where they go in.
+    // Along the normal, at each contact point; positive pushes body A along the normal. The
+    // elements behind the number of points come out as 0 and are ignored where they go in.
     float normal[ZPGS_CONTACT_POINTS];
     // Along the two tangents of the collision, at the centre of its points.
     float friction[2];
@@ -309,8 +313,8 @@ enum zpgs_status zpgs_set_shapes(struct zpgs_accelerator *accelerator,
 enum zpgs_status zpgs_parameters_default(struct zpgs_parameters *parameters, size_t size);
 
 // The `count` of a collision with a friction coefficient of its own, rounded to three digits, for
-// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite. A
-// count of 0 stays 0.
+// `pair_friction` of `zpgs_parameters`. A step refuses a friction that is negative or not finite.
+// A count of 0 stays 0.
 uint32_t zpgs_count_with_friction(uint32_t count, float friction);
 
 // Solves the contacts of one time step, and integrates it if the parameters say so. Returns when
@@ -352,13 +356,13 @@ enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
                            const struct zpgs_bodies *bodies,
                            struct zpgs_report *report);
 
-// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in the
-// order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is the number
-// of collisions of that step. For the warm start of the next step, sounds, damage.
+// Stores the impulses of each collision of the last step that succeeded with `impulses_out`, in
+// the order of its collisions. `impulses` has `count` elements of `zpgs_impulses`, and `count` is
+// the number of collisions of that step. For the warm start of the next step, sounds, damage.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is as
-// `zpgs_strided` describes, and no other thread uses its elements during the call.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `impulses` is
+// as `zpgs_strided` describes, and no other thread uses its elements during the call.
 enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
                                     struct zpgs_strided impulses,
                                     size_t count);
@@ -373,8 +377,8 @@ enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
 enum zpgs_status zpgs_cancel(const struct zpgs_accelerator *accelerator);
 
 // Checks, orders and packs another step while one is in flight, in place of one that was prepared
-// before. The arrays are the caller's again when the call returns; the step has their values of now,
-// so that it cannot depend on the results of the step in flight.
+// before. The arrays are the caller's again when the call returns; the step has their values of
+// now, so that it cannot depend on the results of the step in flight.
 //
 // # Safety
 // As `zpgs_step`.
@@ -386,17 +390,17 @@ enum zpgs_status zpgs_prepare(struct zpgs_accelerator *accelerator,
 // Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in
 // flight: the results are read while the board works on the next step.
 //
-// The status is that of the step that has ended. `started` gets the status of the start, and a step
-// is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before: `zpgs_wait`
-// ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started because the
-// call was refused. `zpgs_last_error` has the text of the step that has ended or, if that is done, of
-// the start.
+// The status is that of the step that has ended. `started` gets the status of the start, and a
+// step is in flight afterwards if it is `ZPGS_STATUS_OK`, whatever became of the step before:
+// `zpgs_wait` ends it, with its own bodies. It is `ZPGS_STATUS_SEQUENCE` where nothing was started
+// because the call was refused. `zpgs_last_error` has the text of the step that has ended or, if
+// that is done, of the start.
 //
 // `report` may be null.
 //
 // # Safety
-// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during the
-// call.
+// As `zpgs_step`; `started` is null or the address of a status that no other thread uses during
+// the call.
 enum zpgs_status zpgs_wait_and_start(struct zpgs_accelerator *accelerator,
                                      const struct zpgs_bodies *bodies,
                                      struct zpgs_report *report,
@@ -419,14 +423,14 @@ enum zpgs_status zpgs_begin(struct zpgs_accelerator *accelerator);
 // Appends `count` collisions to the list, all or none. The arrays are the caller's again when the
 // call returns.
 //
-// A collision of count 0 keeps its place. `impulses` has the impulses that a step with `warm_start`
-// begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null if no step of the
-// list starts warm. `zpgs_end` checks the values of both.
+// A collision of count 0 keeps its place. `impulses` has the impulses that a step with
+// `warm_start` begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null
+// if no step of the list starts warm. `zpgs_end` checks the values of both.
 //
 // # Safety
-// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions` is
-// null or the address of `count` collisions, and `impulses` is null or that of `count` impulses; no
-// thread writes them during the call.
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`
+// is null or the address of `count` collisions, and `impulses` is null or that of `count`
+// impulses; no thread writes them during the call.
 enum zpgs_status zpgs_push(struct zpgs_accelerator *accelerator,
                            const struct zpgs_collision *collisions,
                            const struct zpgs_impulses *impulses,
@@ -435,8 +439,8 @@ enum zpgs_status zpgs_push(struct zpgs_accelerator *accelerator,
 // Submits the step of the list, as `zpgs_submit`, and ends the list. The bodies are read now.
 // `zpgs_wait` ends the step.
 //
-// A list that has ended takes no more collisions. It stays until the next `zpgs_begin`, so that its
-// step can be submitted again, as after a fault. If the call fails the list is as before.
+// A list that has ended takes no more collisions. It stays until the next `zpgs_begin`, so that
+// its step can be submitted again, as after a fault. If the call fails the list is as before.
 //
 // # Safety
 // As `zpgs_step`.

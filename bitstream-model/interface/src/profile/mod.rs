@@ -152,15 +152,15 @@ const SIX: u32 = 6;
 const FOUR: u32 = 4;
 
 impl Variant {
-    /// Whether each collision can have a friction of its own: in f32 a record has room for it above the
-    /// number of its contact points.
+    /// Whether each collision can have a friction of its own: in f32 a record has room for it above
+    /// the number of its contact points.
     #[must_use]
     pub const fn has_pair_friction(&self) -> bool {
         matches!(self.numbers.collisions, StreamFormat::F32)
     }
 
-    /// Whether velocity records can bring the inverse mass of their body: the rows of a world inertia
-    /// have room for it.
+    /// Whether velocity records can bring the inverse mass of their body: the rows of a world
+    /// inertia have room for it.
     #[must_use]
     pub const fn has_streamed_masses(&self) -> bool {
         matches!(self.inertia, Inertia::World)

@@ -13,8 +13,8 @@ use crate::stripe::{Stripe, Stripes};
 const FLOAT_CONTACT: Depth = Depth { fill: 374, window: 324 };
 const FLOAT_FRICTION: Depth = Depth { fill: 314, window: 190 };
 
-/// The same with world inertia: a product with a matrix takes 14 cycles more, all of them before the velocities
-/// are read.
+/// The same with world inertia: a product with a matrix takes 14 cycles more, all of them before
+/// the velocities are read.
 const FLOAT_WORLD_CONTACT: Depth = Depth { fill: 388, window: 324 };
 const FLOAT_WORLD_FRICTION: Depth = Depth { fill: 328, window: 190 };
 
@@ -22,8 +22,8 @@ const FLOAT_WORLD_FRICTION: Depth = Depth { fill: 328, window: 190 };
 const CONTACT: Depth = Depth { fill: 364, window: 316 };
 const FRICTION: Depth = Depth { fill: 306, window: 182 };
 
-/// Fill of the integration in the generated Verilog of `float`: 237 cycles of the pipeline, 6 of the
-/// read before it, and 21 of set-up and control. An assumption for every other profile.
+/// Fill of the integration in the generated Verilog of `float`: 237 cycles of the pipeline, 6 of
+/// the read before it, and 21 of set-up and control. An assumption for every other profile.
 const INTEGRATION_FILL: u32 = 264;
 
 /// Block RAM of the XCZU9EG as the thesis counts it, bytes.

@@ -5,8 +5,7 @@
 
 use super::array::Row;
 use crate::accelerator::arithmetic::sixteen;
-use crate::accelerator::integrate::Pose;
-use crate::accelerator::solver::Velocity;
+use crate::accelerator::state::{Pose, Velocity};
 use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity};
 

@@ -1,5 +1,6 @@
-//! Hardware and the model side by side, on the same beats and register accesses. The hardware leads:
-//! the board sees its registers, its results and its interrupt. The first difference ends the step.
+//! Hardware and the model side by side, on the same beats and register accesses. The hardware
+//! leads: the board sees its registers, its results and its interrupt. The first difference ends
+//! the step.
 //!
 //! ```text
 //! register accesses, clocks ----> hardware ----> the board
@@ -27,8 +28,8 @@ use pgs_interface::control::{
 };
 use pgs_interface::register::Register;
 
-/// Most clocks between the end of a step in the hardware and in the model. Clocks in which the hardware
-/// waits for space do not count.
+/// Most clocks between the end of a step in the hardware and in the model. Clocks in which the
+/// hardware waits for space do not count.
 const APART_CLOCKS: u64 = 100_000;
 /// Clocks that the model catches up at once.
 const CATCH_UP_BATCH: u32 = 64;
@@ -38,7 +39,8 @@ const OFFERED_BEATS: usize = 256;
 const SPACE: usize = 1 << 20;
 
 /// Registers that differ between two right accelerators: times, which depend on the moment at which
-/// beats come, and capacities, which are parameters of a build. The end of a step compares the sums.
+/// beats come, and capacities, which are parameters of a build. The end of a step compares the
+/// sums.
 const NOT_COMPARED: &[Register] = &[
     CYCLES_LO,
     CYCLES_HI,
@@ -74,7 +76,8 @@ pub struct LockStep {
     model_busy: bool,
     /// Clocks in which the hardware went on after the model's end.
     alone: u64,
-    /// Whether the hardware or the model may still be in reset, in which its registers mean nothing.
+    /// Whether the hardware or the model may still be in reset, in which its registers mean
+    /// nothing.
     resetting: bool,
     /// Whether the last step ended with an error: its counters mean nothing then.
     failed: bool,
@@ -92,8 +95,8 @@ struct Results {
 }
 
 impl LockStep {
-    /// Puts the model beside hardware that is built as `config` says. `player` is the simulator that
-    /// plays a differing step again for its waveform.
+    /// Puts the model beside hardware that is built as `config` says. `player` is the simulator
+    /// that plays a differing step again for its waveform.
     ///
     /// # Errors
     /// [`ConfigError`] if a number is outside its range.
@@ -317,8 +320,8 @@ impl ExternalAccelerator for LockStep {
         }
         self.busy = clocked.busy;
         if ended {
-            // A wrong beat stops the hardware as it arrives. The model comes to that beat with the beats of the
-            // other streams, which the hardware has not taken any more.
+            // A wrong beat stops the hardware as it arrives. The model comes to that beat with the
+            // beats of the other streams, which the hardware has not taken any more.
             self.history.read(ERROR.offset);
             if self.hardware.read(ERROR.offset)? != 0 {
                 let offered = offer.beats.iter().zip(&clocked.taken);

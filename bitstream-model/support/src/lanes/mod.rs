@@ -14,6 +14,7 @@
 
 #[cfg(target_arch = "aarch64")]
 mod aarch64;
+mod instruction_set;
 mod instructions;
 #[cfg(test)]
 mod tests;
@@ -23,7 +24,8 @@ mod x86;
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-pub use instructions::{InstructionSet, Instructions, Quad, Work, prefetch};
+pub use instruction_set::InstructionSet;
+pub use instructions::{Instructions, Quad, Work, prefetch};
 
 /// Number of lanes.
 pub const LANES: usize = if cfg!(target_arch = "aarch64") { 4 } else { 16 };
