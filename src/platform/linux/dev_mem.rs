@@ -361,9 +361,8 @@ mod tests {
     #[test]
     fn memory_of_the_kernel_is_refused() {
         let (_root, system, windows) = memory();
-        let iomem = "00000000-0000ffff : reserved\n\
-                     00040000-0004ffff : System RAM\n  00041000-00041fff : Kernel code\n\
-                     00080000-00080fff : a0040000.control\n";
+        let iomem = "00000000-0000ffff : reserved\n00040000-0004ffff : System RAM\n  \
+                     00041000-00041fff : Kernel code\n00080000-00080fff : a0040000.control\n";
         write(system.iomem.clone(), iomem);
         let memory = windows.memory.clone();
         let control = windows.window(RegisterMap::Control).expect("no overflow");

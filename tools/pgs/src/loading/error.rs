@@ -355,8 +355,7 @@ fn refused(firmware: &str, source: &io::Error) -> String {
         }
         io::ErrorKind::OutOfMemory => {
             "the kernel has no memory in one piece for the bitstream: enlarge its CMA pool \
-             (cma=256M \
-             on its command line), or load after a reboot"
+             (cma=256M on its command line), or load after a reboot"
                 .to_owned()
         }
         io::ErrorKind::TimedOut => {
@@ -365,8 +364,7 @@ fn refused(firmware: &str, source: &io::Error) -> String {
                 .to_owned()
         }
         _ => "look into dmesg; is it a .bit.bin for this chip, made by bootgen -arch zynqmp? Do \
-            not \
-              touch the registers before the state is operating"
+            not touch the registers before the state is operating"
             .to_owned(),
     }
 }

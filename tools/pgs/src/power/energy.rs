@@ -105,8 +105,7 @@ impl Energy {
             .collect();
         format!(
             "measured: {}; {} samples idle and {} busy; ± two standard errors and the sensors' \
-             gain, \
-             without the tolerance of the shunts",
+             gain, without the tolerance of the shunts",
             parts.join("; "),
             self.idle.samples,
             self.busy.samples
@@ -141,8 +140,7 @@ pub(crate) fn at_thesis_power(ms: f64) -> (String, Value) {
     let joules = ZCU102_WATTS * ms / 1e3;
     let text = format!(
         "{joules:.3} J a step at {ZCU102_WATTS} W, the power that the thesis takes for the board: \
-         not \
-         measured"
+         not measured"
     );
     (text, json!({ "origin": "recorded", "watts": ZCU102_WATTS, "joules_a_step": joules }))
 }

@@ -92,8 +92,7 @@ pub(crate) fn run(
             ),
             error @ ServeError::Socket { .. } => Failure::input(error).next(
                 "name a socket with --socket whose folder is there and may be written to, and \
-                 whose \
-                 path has at most 107 bytes",
+                 whose path has at most 107 bytes",
             ),
             error => Failure::input(error),
         })?;

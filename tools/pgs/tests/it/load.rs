@@ -133,9 +133,8 @@ fn a_check_needs_no_board_and_loads_nothing() {
     let ran = check(&[]);
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(0), ""));
     let expected = format!(
-        "bitstream  {}, 328 bytes, full\nchip       XCZU9EG (IDCODE 0x04738093)\n\
-         pl clock   the bitstream asks for 100 MHz, the overlay sets 100 MHz\n\
-         checked    nothing was loaded\n",
+        "bitstream  {}, 328 bytes, full\nchip       XCZU9EG (IDCODE 0x04738093)\npl clock   the \
+         bitstream asks for 100 MHz, the overlay sets 100 MHz\nchecked    nothing was loaded\n",
         file.display()
     );
     assert_eq!(ran.stdout, expected);

@@ -95,7 +95,7 @@ use Source::{Latency, Powers};
 struct Figure {
     /// The thesis' table.
     table: fn(&Design) -> &'static str,
-    name: &'static str,
+    name: String,
     /// The printed figure, if there is one.
     printed: fn(&Design) -> Option<f64>,
     /// How to compute the figure: from a latency, or from the thesis' powers alone.
@@ -107,90 +107,43 @@ enum Source {
     Powers(f64),
 }
 
-const fn figure(
-    table: fn(&Design) -> &'static str,
-    name: &'static str,
-    printed: fn(&Design) -> Option<f64>,
-    of: Source,
-) -> Figure {
-    Figure { table, name, printed, of }
+/// The figures in the order of the thesis' tables of latency, speed-up and efficiency.
+fn all_figures() -> Vec<Figure> {
+    type Table = fn(&Design) -> &'static str;
+    type Printed = fn(&Design) -> Option<f64>;
+    let mut all = Vec::new();
+    let mut add = |table: Table, name: &str, printed: Printed, of| {
+        all.push(Figure { table, name: name.to_owned(), printed, of });
+    };
+    let latency: Table = |design| design.comparison;
+    add(latency, "latency, ms", |it| Some(it.latency_ms), Latency(|it| it.ms));
+    add(latency, "energy at 15 W, J", |it| Some(it.joules), Latency(Outcome::joules));
+    let speedups: Table = |design| design.speedups;
+    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("speed-up over {}", platform.name));
+    add(speedups, &gpu, |it| Some(it.speedup.gpu), Latency(|it| it.speedup(&GPU)));
+    add(speedups, &cpu, |it| Some(it.speedup.cpu), Latency(|it| it.speedup(&CPU)));
+    let efficiencies: Table = |design| design.efficiencies;
+    let power: [Printed; 2] = [|it| Some(it.power.gpu), |it| Some(it.power.cpu)];
+    for (platform, printed) in [GPU, CPU].into_iter().zip(power) {
+        let name = format!("power efficiency over {}", platform.name);
+        add(efficiencies, &name, printed, Powers(platform.watts / ZCU102_WATTS));
+    }
+    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("energy efficiency over {}", platform.name));
+    add(efficiencies, &gpu, |it| Some(it.energy.gpu), Latency(|it| it.energy(&GPU)));
+    add(efficiencies, &cpu, |it| Some(it.energy.cpu), Latency(|it| it.energy(&CPU)));
+    for platform in [GPU, CPU] {
+        let name = format!("power efficiency, {} TDP", platform.name);
+        add(efficiencies, &name, |_| None, Powers(platform.design_watts / ZCU102_WATTS));
+    }
+    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("energy efficiency, {} TDP", platform.name));
+    let of_gpu = Latency(|it| it.energy_at(GPU.design_watts, &GPU));
+    let of_cpu = Latency(|it| it.energy_at(CPU.design_watts, &CPU));
+    add(efficiencies, &gpu, |_| None, of_gpu);
+    add(efficiencies, &cpu, |_| None, of_cpu);
+    let whole: Printed = |it| Some(it.whole_step);
+    add(|_| "eq 6.5", "whole step over GTX 980's", whole, Latency(Outcome::whole_step));
+    all
 }
-
-/// A figure of its latency table, of its speed-ups, and of its efficiencies.
-const COMPARISON: fn(&Design) -> &'static str = |design| design.comparison;
-const SPEEDUPS: fn(&Design) -> &'static str = |design| design.speedups;
-const EFFICIENCIES: fn(&Design) -> &'static str = |design| design.efficiencies;
-
-const FIGURES: [Figure; 13] = [
-    figure(COMPARISON, "latency, ms", |it| Some(it.latency_ms), Latency(|it| it.ms)),
-    figure(COMPARISON, "energy at 15 W, J", |it| Some(it.joules), Latency(Outcome::joules)),
-    figure(
-        SPEEDUPS,
-        "speed-up over GTX 980",
-        |it| Some(it.speedup.gpu),
-        Latency(|it| it.speedup(&GPU)),
-    ),
-    figure(
-        SPEEDUPS,
-        "speed-up over i7-3770",
-        |it| Some(it.speedup.cpu),
-        Latency(|it| it.speedup(&CPU)),
-    ),
-    figure(
-        EFFICIENCIES,
-        "power efficiency over GTX 980",
-        |it| Some(it.power.gpu),
-        Powers(GPU.watts / ZCU102_WATTS),
-    ),
-    figure(
-        EFFICIENCIES,
-        "power efficiency over i7-3770",
-        |it| Some(it.power.cpu),
-        Powers(CPU.watts / ZCU102_WATTS),
-    ),
-    figure(
-        EFFICIENCIES,
-        "energy efficiency over GTX 980",
-        |it| Some(it.energy.gpu),
-        Latency(|it| it.energy(&GPU)),
-    ),
-    figure(
-        EFFICIENCIES,
-        "energy efficiency over i7-3770",
-        |it| Some(it.energy.cpu),
-        Latency(|it| it.energy(&CPU)),
-    ),
-    figure(
-        EFFICIENCIES,
-        "power efficiency, GTX 980 TDP",
-        |_| None,
-        Powers(GPU.design_watts / ZCU102_WATTS),
-    ),
-    figure(
-        EFFICIENCIES,
-        "power efficiency, i7-3770 TDP",
-        |_| None,
-        Powers(CPU.design_watts / ZCU102_WATTS),
-    ),
-    figure(
-        EFFICIENCIES,
-        "energy efficiency, GTX 980 TDP",
-        |_| None,
-        Latency(|it| it.energy_at(GPU.design_watts, &GPU)),
-    ),
-    figure(
-        EFFICIENCIES,
-        "energy efficiency, i7-3770 TDP",
-        |_| None,
-        Latency(|it| it.energy_at(CPU.design_watts, &CPU)),
-    ),
-    figure(
-        |_| "eq 6.5",
-        "whole step over GTX 980's",
-        |it| Some(it.whole_step),
-        Latency(Outcome::whole_step),
-    ),
-];
 
 fn against(scene: &Scene) -> Table {
     let mut table = Table::with_columns(
@@ -211,7 +164,7 @@ fn against(scene: &Scene) -> Table {
         ],
     );
     for variant in &scene.variants {
-        for figure in &FIGURES {
+        for figure in &all_figures() {
             add(&mut table, scene, variant, figure);
         }
     }
@@ -273,7 +226,7 @@ fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
     table.row([
         text(variant.profile.name),
         text(design.map_or("-", figure.table)),
-        text(figure.name),
+        text(&figure.name),
         Cell::known(printed, number),
         Cell::known(recomputed, number),
         packed,

@@ -53,7 +53,7 @@ pub(crate) static SPLIT: Experiment = Experiment {
         gains",
     boards: Boards::Any,
     arguments: Options::augment_args,
-    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.
@@ -77,25 +77,6 @@ pub(crate) struct Options {
         value_parser = clap::value_parser!(u32).range(1..=1000)
     )]
     pub(crate) runs: u32,
-}
-
-/// The shares, and the gains.
-#[derive(Debug)]
-pub(crate) struct Outcome {
-    pub(crate) complete: bool,
-    pub(crate) grid: String,
-    pub(crate) drop_m: f32,
-    pub(crate) bodies: usize,
-    /// In the last measured step.
-    pub(crate) collisions: usize,
-    /// Medians; none if Ctrl-C came before the first measured step.
-    pub(crate) median: Option<Times>,
-    /// The smallest and the largest share of a step.
-    pub(crate) response_share_range: Option<[f64; 2]>,
-    /// The thesis' share.
-    pub(crate) recorded_share: f64,
-    pub(crate) gains: Vec<Gain>,
-    pub(crate) samples: Vec<Times>,
 }
 
 /// Times of one step, ms.
@@ -122,7 +103,7 @@ pub(crate) struct Gain {
 }
 
 /// Steps the pile, and times each measured step's search and response.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
     let Options { grid, drop, .. } = *options;
     let build = Build { threads: Some(1), ..Build::default() };
     let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
@@ -157,24 +138,36 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         });
     }
     session.end();
-    let median = Times::median(&samples);
-    let shares: Vec<f64> = samples.iter().map(Times::response_share).collect();
-    let range = shares.iter().fold(None, |range: Option<[f64; 2]>, share| {
-        let [least, most] = range.unwrap_or([*share; 2]);
-        Some([least.min(*share), most.max(*share)])
-    });
-    Ok(Outcome {
-        complete: samples.len() as u64 == u64::from(options.runs),
-        grid: grid.to_string(),
-        drop_m: drop,
-        bodies: scene.bodies().len(),
-        collisions: scene.collisions().len(),
-        median,
-        response_share_range: range,
-        recorded_share: ACCELERATED_SHARE,
-        gains: median.as_ref().map(gains).unwrap_or_default(),
-        samples,
-    })
+    let (bodies, collisions) = (scene.bodies().len() as u64, scene.collisions().len() as u64);
+    let mut part = Part::of(Vec::new());
+    part.complete = samples.len() as u64 == u64::from(options.runs);
+    let pile = format!(
+        "{grid} cubes dropped from {drop} m: {} bodies, {} collisions, median of {} steps, one \
+         thread",
+        grouped(bodies),
+        grouped(collisions),
+        samples.len()
+    );
+    part.fact("pile", pile);
+    // None if Ctrl-C came before the first measured step.
+    let Some(times) = Times::median(&samples) else { return Ok(part) };
+    let shares = samples.iter().map(Times::response_share);
+    let [least, most] = shares
+        .fold([1.0, 0.0], |[least, most]: [f64; 2], share| [least.min(share), most.max(share)]);
+    part.tables = vec![times.table(), table_of_gains(&gains(&times))];
+    let response = times.response_share();
+    let text = format!(
+        "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); thesis {:.0} \
+         % (recorded)",
+        100.0 * response,
+        100.0 * least,
+        100.0 * most,
+        100.0 * ACCELERATED_SHARE,
+    );
+    part.fact("share", text);
+    let (figure, row) = figure(grid, response);
+    part.figure(figure, [row]);
+    Ok(part)
 }
 
 /// The yardstick's time for the step.
@@ -263,84 +256,52 @@ fn gains(times: &Times) -> Vec<Gain> {
     thesis.chain(ours).collect()
 }
 
-impl Outcome {
-    /// The facts and tables of the outcome.
-    fn part(&self) -> Part {
-        let Self { grid, drop_m, bodies, collisions, samples, .. } = self;
-        let (bodies, collisions) = (grouped(*bodies as u64), grouped(*collisions as u64));
-        let pile = format!(
-            "{grid} cubes dropped from {drop_m} m: {bodies} bodies, {collisions} collisions, \
-             median of {} steps, one thread",
-            samples.len()
-        );
-        let tables = self.median.iter().flat_map(|times| [times.table(), self.of_gains()]);
-        let mut part = Part::of(tables.collect());
-        part.complete = self.complete;
-        part.fact("pile", pile);
-        if let Some((times, [least, most])) = self.median.as_ref().zip(self.response_share_range) {
-            let text = format!(
-                "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); \
-                 thesis {:.0} % (recorded)",
-                100.0 * times.response_share(),
-                100.0 * least,
-                100.0 * most,
-                100.0 * self.recorded_share,
-            );
-            part.fact("share", text);
-            let (figure, row) = self.figure(times.response_share());
-            part.figure(figure, [row]);
-        }
-        part
-    }
+/// The shares beside the thesis'.
+fn figure(grid: Grid, response: f64) -> (Figure, Row) {
+    let both = |response: f64| [100.0 - 100.0 * response, 100.0 * response];
+    let (recorded, ours) = (both(ACCELERATED_SHARE), both(response));
+    let figure = Figure::new(
+        ("figure-shares", "§4.4"),
+        "Shares of collision search and collision response",
+        bars(
+            "% of both",
+            &["search", "response"].map(str::to_owned),
+            &["recorded", "measured"].map(str::to_owned),
+            &[0, 1].map(|part| vec![Some(recorded[part]), Some(ours[part])]),
+        ),
+        format!(
+            "a pile of {grid} cubes, in processor time of one thread of this host. The thesis \
+             names neither its processor nor its program for the shares."
+        ),
+    );
+    let shown = |[search, response]: [f64; 2], digits: usize| {
+        format!("{search:.digits$} % search, {response:.digits$} % response")
+    };
+    let on_host = format!("{}, on one core of this host", shown(ours, 1));
+    let row = figure.row("shares of a step", shown(recorded, 0), on_host);
+    (figure, row)
+}
 
-    /// The shares beside the thesis'.
-    fn figure(&self, response: f64) -> (Figure, Row) {
-        let both = |response: f64| [100.0 - 100.0 * response, 100.0 * response];
-        let (recorded, ours) = (both(self.recorded_share), both(response));
-        let figure = Figure::new(
-            ("figure-shares", "§4.4"),
-            "Shares of collision search and collision response",
-            bars(
-                "% of both",
-                &["search", "response"].map(str::to_owned),
-                &["recorded", "measured"].map(str::to_owned),
-                &[0, 1].map(|part| vec![Some(recorded[part]), Some(ours[part])]),
+fn table_of_gains(gains: &[Gain]) -> Table {
+    let mut table = Table::new("gains", "The whole step by equation 6.5");
+    for gain in gains {
+        table.row([
+            ("response", "response", text(&gain.response)),
+            ("factor", "factor\ns", Cell::Number(gain.factor, 2)),
+            (
+                "whole_with_recorded_share",
+                "whole\np = 0.6",
+                Cell::Number(gain.whole_with_recorded_share, 2),
             ),
-            format!(
-                "a pile of {} cubes, in processor time of one thread of this host. The thesis \
-                 names neither its processor nor its program for the shares.",
-                self.grid
+            (
+                "whole_with_measured_share",
+                "whole\nmeasured",
+                Cell::Number(gain.whole_with_measured_share, 2),
             ),
-        );
-        let shown = |[search, response]: [f64; 2], digits: usize| {
-            format!("{search:.digits$} % search, {response:.digits$} % response")
-        };
-        let on_host = format!("{}, on one core of this host", shown(ours, 1));
-        let row = figure.row("shares of a step", shown(recorded, 0), on_host);
-        (figure, row)
+            ("recorded", "thesis", Cell::known(gain.recorded, |gain| Cell::Number(gain, 2))),
+        ]);
     }
-
-    fn of_gains(&self) -> Table {
-        let mut table = Table::new("gains", "The whole step by equation 6.5");
-        for gain in &self.gains {
-            table.row([
-                ("response", "response", text(&gain.response)),
-                ("factor", "factor\ns", Cell::Number(gain.factor, 2)),
-                (
-                    "whole_with_recorded_share",
-                    "whole\np = 0.6",
-                    Cell::Number(gain.whole_with_recorded_share, 2),
-                ),
-                (
-                    "whole_with_measured_share",
-                    "whole\nmeasured",
-                    Cell::Number(gain.whole_with_measured_share, 2),
-                ),
-                ("recorded", "thesis", Cell::known(gain.recorded, |gain| Cell::Number(gain, 2))),
-            ]);
-        }
-        table
-    }
+    table
 }
 
 impl Times {

@@ -48,8 +48,7 @@ impl Picture<'_> {
 
         let mut text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-             stroke-linejoin=\"round\">\n\
-             <path fill=\"#dfe3e8\" d=\"M0 0H{width}V{height}H0z\"/>\n",
+             stroke-linejoin=\"round\">\n<path fill=\"#dfe3e8\" d=\"M0 0H{width}V{height}H0z\"/>\n",
         );
         for face in &seen {
             path(&mut text, face);

@@ -102,8 +102,7 @@ fn role(node: &UioNode) -> (Option<String>, Option<(&'static str, String)>) {
         Some(NodePart::Unnamed) => {
             let reason = format!(
                 "regions where the accelerator's lie, without their names: give it `reg-names`, \
-                 and \
-                 {}; see device-tree/zynq-pgs.dtsi",
+                 and {}; see device-tree/zynq-pgs.dtsi",
                 uio_name(UIO_NODE)
             );
             return (Some(reason), None);

@@ -19,8 +19,7 @@ pub(super) fn start(sensors: Option<Sensors>, is_alone: bool) -> Option<PowerMet
     if !is_alone {
         log::warn!(
             "the energy is not measured: the sensors also see the steps of the cold scene; leave \
-             out \
-             --beside-cold"
+             out --beside-cold"
         );
         return None;
     }

@@ -278,8 +278,7 @@ impl<'a> Summary<'a> {
         };
         Some(format!(
             "{} in {} of {} steps: {:.1} % of the cycles wait for memory{at}, {:.1} % for \
-             velocities \
-             (hazards)",
+             velocities (hazards)",
             limit_text(limit),
             grouped(held.into()),
             grouped(totals.steps.into()),

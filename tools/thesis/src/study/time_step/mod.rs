@@ -11,7 +11,7 @@ use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
-use crate::experiment::{Boards, Experiment, given};
+use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::failure::Failure;
@@ -46,7 +46,7 @@ pub(crate) static TIME_STEP: Experiment = Experiment {
     about: "A body in flight and a pile with time steps from 1/480 s to 1/15 s",
     boards: Boards::Any,
     arguments: Options::augment_args,
-    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
+    run: |args, session| measure(&given(args)?, session),
 };
 
 /// Its arguments.
@@ -75,17 +75,6 @@ pub(crate) struct Options {
         value_parser = clap::value_parser!(u32).range(1..=255)
     )]
     pub(crate) iterations: u32,
-}
-
-/// The same simulated time in steps of several lengths.
-#[derive(Debug)]
-pub(crate) struct Outcome {
-    pub(crate) complete: bool,
-    pub(crate) grid: String,
-    pub(crate) drop_m: f32,
-    pub(crate) seconds: u16,
-    pub(crate) iterations: u32,
-    pub(crate) rows: Vec<Row>,
 }
 
 /// One time step.
@@ -129,7 +118,7 @@ struct Sample {
 }
 
 /// Takes the steps of every length.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
     scenes::check_rows(options.grid)?;
     let mut opened = board::open(&session.common, &Build::default())?.stated();
     session.watch(&mut opened);
@@ -152,14 +141,7 @@ pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, F
         rows.push(Row { steps_per_second: rate, time_step_s, flight, pile });
     }
     session.end();
-    Ok(Outcome {
-        complete: rows.len() == RATES.len(),
-        grid: options.grid.to_string(),
-        drop_m: options.drop,
-        seconds: options.seconds,
-        iterations: options.iterations,
-        rows,
-    })
+    Ok(Part { complete: rows.len() == RATES.len(), ..show::part(options, &rows) })
 }
 
 fn scene(options: &Options) -> Result<Scene, Failure> {
