@@ -68,16 +68,16 @@ impl Args for ThesisArgs {
             .action(ArgAction::SetTrue)
             .help("Print Markdown instead of text");
         let each = experiments().into_iter().map(|experiment| {
-            let command =
-                (experiment.arguments)(Command::new(experiment.id)).about(experiment.about);
-            let command = command.arg(markdown.clone());
-            match experiment.boards {
+            let command = (experiment.arguments)(Command::new(experiment.id)).arg(markdown.clone());
+            let command = match experiment.boards {
                 Boards::None => command,
                 Boards::Own => AcceleratorOptions::augment_args(command),
                 Boards::Any => {
                     AcceleratorOptions::augment_args(BoardOptions::augment_args(command))
                 }
-            }
+            };
+            // Last: options bring what is said of them, too.
+            command.about(experiment.about).long_about(None)
         });
         AllArgs::augment_args(command)
             .about("Measure the thesis again: its tables and figures from our own numbers")
@@ -227,7 +227,13 @@ pub(crate) mod tests {
 
     #[test]
     fn the_definition_is_consistent_and_each_name_stands_once() {
-        ThesisArgs::augment_args(Command::new("thesis")).debug_assert();
+        let mut command = ThesisArgs::augment_args(Command::new("thesis"));
+        for experiment in experiments() {
+            let found = command.find_subcommand(experiment.id).and_then(Command::get_about);
+            assert_eq!(found.map(ToString::to_string).as_deref(), Some(experiment.about));
+        }
+        command.build();
+        command.debug_assert();
         let mut names: Vec<_> = experiments().iter().map(|each| each.id).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|two| two[0] != two[1]), "{names:?}");
