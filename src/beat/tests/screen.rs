@@ -345,10 +345,10 @@ fn an_arm_that_is_too_long_is_noticed_about_whichever_body() {
         let profile = &HALF;
         let limits = Limits::roomy(profile.default_variant());
         for (near, far) in [(2, 2), (1, 2), (2, 1), (0, 2), (2, 0)] {
-            let bodies = vec![at(1.0, near), at(17.0, far)];
+            let bodies = vec![at(1.0, near), at(27.0, far)];
             for (body_a, count) in (0..8).map(|case| (case % 2, 1 + case / 2)) {
                 // All other used contact points lie midway between the bodies.
-                let mut contacts = [contact(9.0); 4];
+                let mut contacts = [contact(14.0); 4];
                 let (used, unused) = contacts.split_at_mut(count as usize);
                 used[used.len() - 1] = contact(1.0);
                 unused.fill(contact(f32::NAN));
