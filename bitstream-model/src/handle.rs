@@ -76,8 +76,10 @@ impl EmulatedBoard {
         accelerator: Option<Box<dyn ExternalAccelerator>>,
     ) -> Self {
         let board = standard(|| {
-            // It computes as the model does; another accelerator has to compute itself.
-            let fast = if accelerator.is_none() { Fast::of(&config) } else { None };
+            // It computes as the model does, in memory of the board; another accelerator has to
+            // compute itself.
+            let own = accelerator.is_none() && memory.is_own();
+            let fast = if own { Fast::of(&config) } else { None };
             Board::new(config, memory, fast.map(Box::new), accelerator)
         });
         Self(Arc::new(Mutex::new(board)))

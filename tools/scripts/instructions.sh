@@ -126,8 +126,8 @@ while read -r profile limit; do
 	collisions=$(some ' NUMBER collisions,')
 	hold "$what" $((instructions * 10 / collisions)) "a collision" "$limit"
 done <<'LIMITS'
-float 3390
-half 5500
+float 3840
+half 72400
 LIMITS
 
 [ $held = 10 ] || fail "$held of 10 were counted"

@@ -132,7 +132,8 @@ pub struct BoardConfig {
     /// result and no counter.
     pub threads: usize,
     /// Whether the board takes a step at once where its host waits for the whole of it. That
-    /// changes no result, and of the counters the cycles of waits alone.
+    /// changes no result; of the counters the waits, and where collisions wait for beats also the
+    /// stalls, are those of another model (`fast/README.md`).
     pub fast: bool,
 }
 

@@ -137,7 +137,8 @@ struct Field<'a> {
 
 // SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one
 // thread has taken. The chunks of the pass before over the same bodies or blocks have ended, and so
-// have the earlier chunks of this pass: `progress` tells it with release and acquire.
+// have the earlier chunks of this pass: `progress` tells it with release and acquire. Each thread has a
+// spare row of its own, and nobody writes the rows of static bodies, which all threads read.
 unsafe impl Sync for Field<'_> {}
 
 /// Marks the field as broken when dropped, unless it was cleared before.

@@ -12,6 +12,8 @@ use pgs_interface::axi_dma::Direction;
 use pgs_interface::record::{BEAT_BYTES, Beat, collision};
 use pgs_support::lanes::Quad;
 
+/// The number of a pass that surely is not warm: a step has fewer passes.
+pub(super) const COLD: u32 = u32::MAX - 1;
 /// The kinds of passes by the packets that they bring: collisions alone, with normal impulses, and
 /// with impulses of friction.
 pub(super) const KINDS: usize = 3;
@@ -81,7 +83,7 @@ impl Packets {
         let passes = accelerator.arguments.passes();
         let warm = [0, accelerator.arguments.contact_passes()];
         let of_kind: [_; KINDS] = std::array::from_fn(|kind| {
-            let pass = if kind == 0 { u32::MAX - 1 } else { warm[kind - 1] };
+            let pass = if kind == 0 { COLD } else { warm[kind - 1] };
             accelerator.collisions_in(pass).array().packets
         });
         let Self { receivers, chain, .. } = std::mem::take(self);
@@ -222,7 +224,7 @@ impl<'a> Collisions<'a> {
         let records = accelerator.arguments.collisions as usize;
         let [usual, contact, friction] = input.collisions;
         let of = |pass, views| Rows::new(accelerator.collisions_in(pass).array(), views);
-        let rows = of(u32::MAX - 1, usual?)?;
+        let rows = of(COLD, usual?)?;
         let mut warm = [None; 2];
         let first = [0, accelerator.arguments.contact_passes()];
         for (to, (views, pass)) in warm.iter_mut().zip([contact, friction].into_iter().zip(first)) {

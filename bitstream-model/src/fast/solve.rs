@@ -11,7 +11,7 @@ use super::block::{
 };
 use super::fronts::Fronts;
 use super::groups::Groups;
-use super::read::{Collisions, Input, KINDS, Views, kind};
+use super::read::{COLD, Collisions, Input, KINDS, Views, kind};
 use super::{Fast, Plan};
 use crate::accelerator::Accelerator;
 use crate::accelerator::hazards::Entry;
@@ -74,7 +74,7 @@ impl Fast {
             self.collisions[number].clear();
             let Some(views) = input.collisions[number] else { continue };
             let pass = match number {
-                0 => u32::MAX - 1,
+                0 => COLD,
                 1 => 0,
                 _ => accelerator.arguments.contact_passes(),
             };

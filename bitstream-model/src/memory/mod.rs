@@ -176,6 +176,11 @@ impl Memory {
         }
     }
 
+    /// Whether the board has memory of its own.
+    pub(crate) fn is_own(&self) -> bool {
+        self.external.is_none()
+    }
+
     /// Memory outside the board; the device may touch the granted ranges only.
     pub(crate) fn external(memory: Box<dyn DeviceMemory>, granted: Vec<Range<u64>>) -> Self {
         Self {

@@ -61,7 +61,8 @@ pub fn standard_around<R>(work: impl FnOnce(&Outside) -> R) -> R {
 ///
 /// - x86-64: a subnormal operand raises the denormal flag, an inexact subnormal result underflow.
 ///   An exact one raises nothing until it is an operand; so the caller looks at the results that
-///   it hands on.
+///   it hands on. Nor does an operand beside a NaN or divided by zero: the work divides by zero
+///   constants alone, and compares what may be NaN.
 /// - aarch64: without flushing an exact subnormal result raises nothing, and neither does a
 ///   subnormal operand. So the work is done with FZ set: a flushed operand raises IDC, a flushed
 ///   result UFC, also one that would have been rounded up to a normal number.

@@ -8,8 +8,8 @@ use super::not_built;
 use crate::common::AcceleratorChoice;
 use crate::failure::{Cause, Failure};
 
-/// Starts the accelerator that was chosen for a board that is built as `config` says; none for the built-in
-/// model.
+/// Starts the accelerator that was chosen for a board that is built as `config` says; none for the
+/// built-in model.
 ///
 /// # Errors
 ///

@@ -56,7 +56,8 @@ pub struct BuildArgs {
     /// a step; no result depends on their number [default: one per processor, at most 4]
     #[arg(long, value_name = "N", value_parser = number("threads", |build| build.threads))]
     threads: Option<usize>,
-    /// Take whole steps of the emulated board at once; no result depends on it [default: on]
+    /// Take whole steps of the emulated board at once; no result depends on it, but modelled waits
+    /// [default: on]
     #[arg(long, value_parser = choice("fast", |build| build.fast))]
     fast: Option<bool>,
 }
