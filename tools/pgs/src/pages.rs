@@ -102,7 +102,7 @@ fn page(command: &Command, others: &[String]) -> io::Result<(String, Vec<u8>)> {
     if command.has_subcommands() {
         man.render_subcommands_section(&mut page)?;
     }
-    if let Some(text) = command.get_after_help() {
+    if let Some(text) = command.get_after_long_help().or_else(|| command.get_after_help()) {
         page.extend(roff(&text.to_string()).into_bytes());
     }
     let others: Vec<_> =
