@@ -91,7 +91,7 @@ async function view(page, { measure, screenshot }) {
 
 // The figures of the thesis that the report draws, and the recorded numbers that it sets beside ours.
 const FIGURES = [
-	"2-2", "2-6", "2-8", "4-1", "4-2", "4-5", "4-6", "4-7", "4-8", "4-9", "4-10", "4-13", "5-1", "5-2", "6-1", "6-2",
+	"2-2", "2-6", "4-1", "4-2", "4-5", "4-6", "4-7", "4-8", "4-9", "4-10", "4-13", "5-1", "5-2", "6-1", "6-2",
 ];
 const RECORDED = ["2.97 %", "84.29 %", "99.93 %", "0.02 %", "99.64 %", "0.06 %", "1,528"];
 
