@@ -27,7 +27,7 @@ pub struct Body {
     pub angular: [f32; 3],
 }
 
-/// A collision of two bodies, of which one at least moves.
+/// A collision of two bodies. At least one body moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Collision {
     /// Indices of bodies A and B.

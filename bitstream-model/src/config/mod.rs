@@ -131,9 +131,9 @@ pub struct BoardConfig {
     /// Threads of the host for the fast way's arithmetic, with the caller's thread. They change no
     /// result and no counter.
     pub threads: usize,
-    /// Whether the board takes a step at once where its host waits for the whole of it. That
-    /// changes no result; of the counters the waits, and where collisions wait for beats also the
-    /// stalls, are those of another model (`fast/README.md`).
+    /// Whether the board takes a step at once where its host waits for the whole step. This changes
+    /// no result. It changes the count of waits, and the count of stalls where collisions wait for
+    /// beats (`fast/README.md`).
     pub fast: bool,
 }
 

@@ -135,10 +135,10 @@ struct Field<'a> {
     instructions: InstructionSet,
 }
 
-// SAFETY: blocks and rows are accessed in `chunk` alone, for the next chunk of a pass that one
-// thread has taken. The chunks of the pass before over the same bodies or blocks have ended, and so
-// have the earlier chunks of this pass: `progress` tells it with release and acquire. Each thread has a
-// spare row of its own, and nobody writes the rows of static bodies, which all threads read.
+// SAFETY: only `chunk` accesses blocks and rows, for the next chunk of a pass that one thread has
+// taken. Earlier chunks of this pass have ended, and so have the chunks of the pass before over the
+// same bodies or blocks: `progress` orders them by release and acquire. Each thread has a spare row
+// of its own. All threads read the rows of static bodies, and no thread writes them.
 unsafe impl Sync for Field<'_> {}
 
 /// Marks the field as broken when dropped, unless it was cleared before.

@@ -57,8 +57,8 @@ pub(super) struct Course {
     pub(super) last_beat: u64,
 }
 
-/// The course of the parts of a step, after `moved` beats of its input on each stream. The beats
-/// come `early` for so many cycles: the accelerator had no use for them.
+/// The course of the parts of a step, after `moved` beats of its input on each stream. The streams
+/// are `early` cycles ahead of the accelerator.
 pub(super) fn course(
     parts: &[Part],
     mut early: u64,

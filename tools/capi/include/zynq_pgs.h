@@ -160,8 +160,8 @@ typedef struct zpgs_strided_const {
 //
 // During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
 // `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with
-// another of its arguments. Elements of several arrays may alternate, as those of an array of
-// structures do.
+// another of its arguments. Elements of several arrays may alternate, as the members of an array
+// of structures do.
 typedef struct zpgs_bodies {
     // Size of the structure, as the caller's header has it.
     size_t size;
