@@ -25,7 +25,7 @@ use bitstream_model::interface::profile::FLOAT;
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use clap::Parser;
 use scene::{Scene, SceneOptions};
-use zynq_pgs::bench::CollisionPacker;
+use zynq_pgs::bench::StepPacker;
 use zynq_pgs::order::{Checker, InputBuffers, IssueWindow, Order, OrderReport, Ordered, Orderer};
 use zynq_pgs::{Accelerator, BoardChoice, OpenOptions, StepParameters};
 
@@ -81,7 +81,7 @@ struct Kept {
     buffers: InputBuffers,
     orderer: Orderer,
     checker: Checker,
-    packer: CollisionPacker,
+    packer: StepPacker,
 }
 
 impl Kept {
@@ -91,7 +91,7 @@ impl Kept {
             buffers: InputBuffers::new(),
             orderer: Orderer::new(),
             checker: Checker::new(),
-            packer: CollisionPacker::new(FLOAT.default_variant()),
+            packer: StepPacker::new(FLOAT.default_variant(), Some(1)),
         }
     }
 }
@@ -148,7 +148,7 @@ fn measure(
     let empty = OrderReport::measure(&schedule, &input, window)?.empty;
 
     let ordered = Ordered { collisions, schedule: &schedule };
-    let mut as_given = CollisionPacker::new(FLOAT.default_variant());
+    let mut as_given = StepPacker::new(FLOAT.default_variant(), Some(1));
     let mut again = InputBuffers::new();
     let mut contestants: [Run<'_>; 4] = [
         Box::new(|| {
@@ -159,10 +159,12 @@ fn measure(
             let _ = black_box(checker.verify(&schedule, &input, window));
         }),
         Box::new(|| {
-            black_box(packer.pack(bodies, &ordered, shapes));
+            let with = (Some(schedule.empty()), &StepParameters::default());
+            let _ = black_box(packer.pack(bodies, &ordered, shapes, with));
         }),
         Box::new(|| {
-            black_box(as_given.pack(bodies, collisions, shapes));
+            let with = (None, &StepParameters::default());
+            let _ = black_box(as_given.pack(bodies, collisions, shapes, with));
         }),
     ];
     // Once without measuring, so that all memory is allocated.
