@@ -124,6 +124,7 @@ fn capabilities(text: &mut Text, design: &Design) {
         ),
         ("DMA", dma::ADDRESS_WIDTH.put(dma::LENGTH_WIDTH.put(0, LENGTH_BITS), ADDRESS_BITS)),
         ("NUMBERS", numbers::COLLISIONS.put(0, variant.numbers.collisions as u32)),
+        ("QUEUE", 0),
         ("FENCE_BASE", fence_base),
         ("FENCE_SIZE", fence_size),
     ];
