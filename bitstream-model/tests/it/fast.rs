@@ -141,10 +141,11 @@ fn a_host_that_waits_for_a_whole_step_has_it_taken_at_once() {
         .iter()
         .flat_map(|profile| profile.inertias().iter().map(|inertia| (*profile, *inertia)))
     {
+        let queue = profile.queue.map(|_| 64);
         for extensions in 0..16 {
             let step = extended(scene(400, 800, 7, true), extensions, 7, profile);
             for length_width in [14, 26] {
-                let config = BoardConfig { length_width, inertia, ..board(profile, 512) };
+                let config = BoardConfig { length_width, inertia, queue, ..board(profile, 512) };
                 let found = counted(|| {
                     let mut machine = Machine::with_slots(config, SLOTS);
                     for _ in 0..2 {
