@@ -37,16 +37,6 @@ macro_rules! by_instructions {
 impl Instructions for Neon {
     type Register = float32x4_t;
 
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
-
     by_instructions! {
         add(a, b) vaddq_f32;
         sub(a, b) vsubq_f32;

@@ -24,13 +24,19 @@ pub trait Work {
 /// Proof that the processor has a set of instructions, and the operations by them.
 pub trait Instructions: Copy + Debug {
     /// A number in each lane.
-    type Register: Copy;
+    type Register: bytemuck::Pod;
 
     /// The numbers of an array.
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register;
+    #[inline(always)]
+    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
+        bytemuck::cast(*numbers)
+    }
 
     /// The array of the numbers.
-    fn store(self, numbers: Self::Register) -> [f32; LANES];
+    #[inline(always)]
+    fn store(self, numbers: Self::Register) -> [f32; LANES] {
+        bytemuck::cast(numbers)
+    }
 
     /// The same number in each lane.
     #[inline(always)]
@@ -219,16 +225,6 @@ pub(super) struct Target;
 
 impl Instructions for Target {
     type Register = [f32; LANES];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> [f32; LANES] {
-        *numbers
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: [f32; LANES]) -> [f32; LANES] {
-        numbers
-    }
 }
 
 /// Prefetches a value into the cache, on processors with such an instruction. The address may be

@@ -117,16 +117,6 @@ impl Avx2 {
 impl Instructions for Avx2 {
     type Register = [__m256; 2];
 
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
-
     by_instructions! {
         add(a, b) _mm256_add_ps;
         sub(a, b) _mm256_sub_ps;
@@ -300,16 +290,6 @@ impl Avx512 {
 
 impl Instructions for Avx512 {
     type Register = [__m512; 1];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
 
     by_instructions! {
         add(a, b) _mm512_add_ps;
