@@ -3,14 +3,14 @@
 use pgs_interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
     FRICTION_DEPTH, IDENTIFICATION, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS,
-    PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY, VERSION,
+    PROFILE, QUEUE, S2MM_WIDTHS, SHAPE_CAPACITY, VERSION,
 };
 use pgs_interface::register::Register;
 
 use super::Control;
 
 /// The identification and capability registers, which never change while a bitstream is loaded.
-const CONSTANTS: [&Register; 18] = [
+const CONSTANTS: [&Register; 19] = [
     &IDENTIFICATION,
     &VERSION,
     &PROFILE,
@@ -29,6 +29,7 @@ const CONSTANTS: [&Register; 18] = [
     &MEMORY_PER_RECORD,
     &DMA,
     &NUMBERS,
+    &QUEUE,
 ];
 
 /// The constant registers of one bitstream.
@@ -87,8 +88,8 @@ mod tests {
         let before = control.fingerprint();
         assert_eq!(before.identification(), 0x5047_5331);
         assert_eq!(before.difference(&control.fingerprint()), None);
-        // The capabilities lie between IDENTIFICATION and NUMBERS (interface specification).
-        for offset in (0x100..=0x144).step_by(4) {
+        // The capabilities lie between IDENTIFICATION and QUEUE (interface specification).
+        for offset in (0x100..=0x148).step_by(4) {
             let was = registers.with(|state| state.values.insert(offset, 0xABCD));
             let changed = before.difference(&control.fingerprint()).expect("it differs");
             assert_eq!((changed.found, changed.expected), (0xABCD, was.unwrap_or(0)));

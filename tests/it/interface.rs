@@ -159,6 +159,7 @@ fn control_registers_stand_at_their_published_offsets() {
             ("MEMORY_PER_RECORD", 0x13C),
             ("DMA", 0x140),
             ("NUMBERS", 0x144),
+            ("QUEUE", 0x148),
             ("FENCE_BASE", 0x150),
             ("FENCE_SIZE", 0x154),
             ("ERROR", 0x180),
@@ -182,6 +183,10 @@ fn control_registers_stand_at_their_published_offsets() {
     assert_eq!(control::IMPULSE_SUM_MAX, 0xFFFF_FFFF_FFFF_FFFF);
     assert_eq!(control::COUNTER_MAX, 0xFFFF_FFFF);
     assert_eq!(control::ITERATIONS_MAX, 255);
+    assert_eq!(
+        (control::QUEUE_MAX, control::QUEUE_PATIENCE, control::NUMBERS_PER_BEAT),
+        (256, 4, 4)
+    );
 }
 
 #[test]
@@ -304,6 +309,7 @@ fn float_is_the_profile_of_the_thesis() {
     assert_eq!((friction.fill, friction.window), (328, 190));
     assert!(profile::NAIVE.world.is_none() && profile::HALF.world.is_none());
     assert!(profile::PROFILES.iter().all(|profile| profile.integration_fill == 264));
+    assert_eq!((float.queue, profile::NAIVE.queue, profile::HALF.queue), (Some(0), None, None));
     assert_eq!(float.clock_khz, 275_000);
     assert_eq!(
         (float.default_variant().bytes_per_body(), float.default_variant().bytes_per_collision()),

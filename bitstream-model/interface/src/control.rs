@@ -63,6 +63,9 @@ pub mod flags {
     /// Each velocity record brings the inverse mass of its body, and the shape table is not used.
     /// Only in a bitstream with [`features::WORLD_INERTIA`](super::features::WORLD_INERTIA).
     pub const STREAMED_MASSES: Field = Field::bit("streamed_masses", 5, Access::ReadWrite);
+    /// Collisions enter the pipeline in the order of the stream, past the queue. It changes nothing
+    /// where [`QUEUE`](super::QUEUE) is 0.
+    pub const IN_ORDER: Field = Field::bit("in_order", 6, Access::ReadWrite);
 }
 
 /// Fields of VERSION.
@@ -237,6 +240,7 @@ pub const FLAGS: Register = row(
         flags::WARM_START,
         flags::IMPULSES_OUT,
         flags::STREAMED_MASSES,
+        flags::IN_ORDER,
     ],
     OURS,
 );
@@ -335,6 +339,9 @@ pub const NUMBERS: Register = read_only(
         numbers::POSES,
     ],
 );
+/// Collisions that wait in the issue queue when it is full; 0: there is none, and collisions enter
+/// in the order of the stream. At most [`QUEUE_MAX`].
+pub const QUEUE: Register = read_only("QUEUE", 0x148, &[]);
 /// First byte of the [`Fence`](super::fence::Fence), in units of
 /// [`FENCE_UNIT`](super::fence::FENCE_UNIT).
 pub const FENCE_BASE: Register = read_only("FENCE_BASE", 0x150, &[]);
@@ -373,6 +380,14 @@ pub const RESET: Register = row("RESET", 0x1C0, Access::SelfClearing, 0, &[reset
 
 /// Most passes of each kind that the pass counters hold.
 pub const ITERATIONS_MAX: u32 = 255;
+
+/// Longest issue queue that a bitstream may have, collisions.
+pub const QUEUE_MAX: u32 = 256;
+/// Hazard windows for which younger collisions may pass the oldest one in the issue queue. After
+/// them none may take its bodies.
+pub const QUEUE_PATIENCE: u32 = 4;
+/// Collisions of the issue queue whose numbers share a beat, behind their impulses.
+pub const NUMBERS_PER_BEAT: u32 = 4;
 
 /// The value at which the counters of 32 bits stop: it stands for this count and any larger one.
 pub const COUNTER_MAX: u32 = u32::MAX;
@@ -430,6 +445,7 @@ pub const REGISTERS: &[Register] = &[
     MEMORY_PER_RECORD,
     DMA,
     NUMBERS,
+    QUEUE,
     FENCE_BASE,
     FENCE_SIZE,
     ERROR,

@@ -3,6 +3,7 @@
 mod block;
 mod fronts;
 mod groups;
+mod order;
 mod read;
 mod solve;
 mod time;
@@ -37,6 +38,8 @@ struct Plan {
     damping: f32,
     /// Whether a subnormal number has the step taken again.
     watches: bool,
+    /// Whether the design computes in binary16, or else in f32.
+    binary16: bool,
 }
 
 /// The kind of a pass.
@@ -96,8 +99,11 @@ pub(crate) struct Fast {
     passing: Stream,
     /// Which bodies each collision moves; `None` for padding.
     entries: Vec<Option<Entry>>,
+    /// Collisions in sixteen bits as they would come in f32.
+    widened: read::Widened,
     /// In the way of one collision after the other: the collisions of each kind of pass.
     collisions: [Vec<Collision>; read::KINDS],
+    order: order::Order,
     lanes: solve::Lanes,
     results: [Vec<Beat>; STREAMS_MAX],
 }
@@ -131,7 +137,9 @@ impl Fast {
             counted: Vec::new(),
             passing: Stream::unread(),
             entries: Vec::new(),
+            widened: Default::default(),
             collisions: Default::default(),
+            order: order::Order::new(config.queue_depth()),
             lanes: solve::Lanes::default(),
             results: Default::default(),
         })
@@ -148,7 +156,9 @@ impl Fast {
         waits: bool,
         parts: &mut Parts<'_>,
     ) -> bool {
-        self.end = self.taken(ran, if waits { u64::MAX } else { until }, parts);
+        let mut widened = std::mem::take(&mut self.widened);
+        self.end = self.taken(ran, if waits { u64::MAX } else { until }, &mut widened, parts);
+        self.widened = widened;
         self.end.is_some()
     }
 
@@ -157,7 +167,13 @@ impl Fast {
         self.end.map(|end| end.at)
     }
 
-    fn taken(&mut self, ran: u64, until: u64, parts: &mut Parts<'_>) -> Option<End> {
+    fn taken(
+        &mut self,
+        ran: u64,
+        until: u64,
+        widened: &mut read::Widened,
+        parts: &mut Parts<'_>,
+    ) -> Option<End> {
         let Parts { now, accelerator, cores, inputs, outputs, arbiter, with } = parts;
         let debt = accelerator.loaded()?;
         let arguments = accelerator.arguments;
@@ -172,7 +188,7 @@ impl Fast {
         self.packets.find(accelerator, cores, &outgoing, with.memory)?;
         let ahead = self.packets.ahead(inputs)?;
         let input = self.packets.views(with.memory)?;
-        let usable = self.read_collisions(accelerator, &input)?;
+        let usable = self.read_collisions(accelerator, &input, widened)?;
         let (mut counters, course) = self.course(accelerator, *arbiter, (ran + debt, ahead));
         let end = *now + ran + debt + course.last_beat.max(course.cycles);
         if end >= until {
@@ -190,6 +206,7 @@ impl Fast {
             warm: arguments.warm_start,
             damping: arguments.solver.spin_damping,
             watches: self.config.profile.flushes_subnormals,
+            binary16: accelerator.variant.numbers == Numbers::BINARY16,
         };
         for (results, beats) in self.results.iter_mut().zip(outgoing) {
             results.clear();
@@ -200,7 +217,7 @@ impl Fast {
             None => Some(self.solve_one_by_one(accelerator, plan)),
         };
         let Some(impulse_sum) = solved else {
-            log::debug!("accelerator: a subnormal number, which the reference has to flush");
+            log::debug!("accelerator: a subnormal number, left to the reference");
             accelerator.forget_passes(input.velocities);
             return None;
         };
@@ -279,15 +296,28 @@ impl Fast {
         let none = [0; STREAMS_MAX];
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
-        let (bodies, collisions) = (accelerator.velocities.len(), self.entries.len());
+        let bodies = accelerator.velocities.len();
         let together = profile.collisions_per_issue as usize;
-        let issues = self.issues(collisions) as u64;
+        let issues = self.issues(self.entries.len()) as u64;
         let mut counters = accelerator.counters;
         self.counted.clear();
         for pass in 0..accelerator.arguments.passes() {
             let segment = accelerator.collisions_in(pass);
             let depth = accelerator.depth(pass);
             let interval = accelerator.interval(pass);
+            let mut writes = none;
+            if accelerator.arguments.sends_impulses(pass) {
+                writes[IMPULSES_STREAM] = accelerator.impulse_beats();
+            }
+            let (reads, fill) = (segment.array().packets, u64::from(depth.fill));
+            if let Some(slots) = self.order.slots() {
+                counters.stalls += slots.idle * interval;
+                counters.hazards += slots.hazards;
+                let work = (slots.all - slots.draining) * interval;
+                let fill = slots.draining * interval + fill;
+                parts.push(Part { reads, writes, work, fill });
+                continue;
+            }
             let of = (u64::from(depth.window), interval);
             let known =
                 self.counted.iter().find(|(kind, _)| *kind == of).map(|(_, stalls)| *stalls);
@@ -300,13 +330,8 @@ impl Fast {
             }
             counters.stalls += found.cycles;
             counters.hazards += found.collisions;
-            let mut writes = none;
-            if accelerator.arguments.sends_impulses(pass) {
-                writes[IMPULSES_STREAM] = collisions;
-            }
             let work = issues * interval + found.cycles;
-            let reads = segment.array().packets;
-            parts.push(Part { reads, writes, work, fill: depth.fill.into() });
+            parts.push(Part { reads, writes, work, fill });
         }
         let (poses, results) = (accelerator.poses_in(), accelerator.results_out());
         let cycles = |array: &crate::accelerator::records::array::Array| array.cycles(bodies);
@@ -328,6 +353,6 @@ fn outgoing(accelerator: &Accelerator) -> PerStream {
     let mut beats = accelerator.results_out().array().packets;
     let arguments = &accelerator.arguments;
     let sends = (0..arguments.passes()).filter(|pass| arguments.sends_impulses(*pass)).count();
-    beats[IMPULSES_STREAM] += sends * arguments.collisions as usize;
+    beats[IMPULSES_STREAM] += sends * accelerator.impulse_beats();
     beats
 }
