@@ -8,6 +8,9 @@ use std::path::PathBuf;
 use pgs_interface::fence::Fence;
 use thiserror::Error;
 
+/// The outcome of a request to the platform.
+pub(crate) type Result<T, E = PlatformError> = std::result::Result<T, E>;
+
 /// Why a request to the platform failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]

@@ -50,6 +50,7 @@ pub(crate) use boards::hardware::{HardwarePlatform, RegisterChoice};
 #[cfg(feature = "emulation")]
 pub(crate) use boards::served::RemotePlatform;
 pub use error::PlatformError;
+pub(crate) use error::Result;
 pub(crate) use fence::{acquire_from_device, release_to_device};
 pub use linux::dev_mem::DevMemWindows;
 pub use linux::fpga::{FpgaManager, ManagerChoice, find_manager, fpga_managers, require_bitstream};
@@ -90,12 +91,12 @@ pub(crate) enum Access {
 /// A board: its register windows, its memory, its one interrupt, its clock.
 pub(crate) trait Platform: fmt::Debug + Send + Sync {
     /// The registers of an AXI DMA or of the accelerator.
-    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError>;
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>>;
     /// The memory for DMA.
     fn memory(&self) -> &dyn DmaMemorySource;
     /// The guard: memory outside the fence of the bitstream, for a test of the fence alone; `None`
     /// if none is reserved.
-    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>> {
         Ok(None)
     }
 
@@ -104,9 +105,9 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
     /// Lets time pass.
     fn pause(&self, duration: Duration);
     /// Waits for the interrupt, which masks it; `None` if `timeout` passes first.
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError>;
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>>;
     /// Lets the interrupt through again.
-    fn unmask_interrupt(&self) -> Result<(), PlatformError>;
+    fn unmask_interrupt(&self) -> Result<()>;
 
     /// Why the board cannot be reached any more. Its registers are then not touched, and read all
     /// ones.
@@ -114,7 +115,7 @@ pub(crate) trait Platform: fmt::Debug + Send + Sync {
         None
     }
     /// Makes sure that the registers may still be touched.
-    fn check_present(&self) -> Result<(), PlatformError> {
+    fn check_present(&self) -> Result<()> {
         self.lost().map_or(Ok(()), Err)
     }
 }

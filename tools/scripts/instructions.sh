@@ -127,7 +127,7 @@ while read -r profile limit; do
 	hold "$what" $((instructions * 10 / collisions)) "a collision" "$limit"
 done <<'LIMITS'
 float 3840
-half 72400
+half 5690
 LIMITS
 
 [ $held = 10 ] || fail "$held of 10 were counted"

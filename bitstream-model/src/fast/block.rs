@@ -158,16 +158,16 @@ impl Block {
         let [ax, ay, az, body_a] = columns(collision::BODY_A);
         let [bx, by, bz, body_b] = columns(collision::BODY_B);
         let (n, position_a, position_b) = ([nx, ny, nz], [ax, ay, az], [bx, by, bz]);
+        self.friction = splat(parameters.friction).to_array();
         let mut counts = [0.0; LANES];
         let (heads, bodies) = (head.to_array(), [body_a.to_array(), body_b.to_array()]);
         for lane in 0..LANES {
             let head = heads[lane].to_bits();
             let friction = if parameters.pair_friction { collision::FRICTION_BITS } else { 0 };
             counts[lane] = (head & !friction) as f32;
-            self.friction[lane] = match parameters.pair_friction {
-                true => pair_friction(head),
-                false => parameters.friction,
-            };
+            if parameters.pair_friction {
+                self.friction[lane] = pair_friction(head);
+            }
             for (rows, bodies) in self.rows.iter_mut().zip(&bodies) {
                 let body = bodies[lane].to_bits();
                 rows[lane] = if members[lane] == NONE { 0 } else { ROWS_APART + body };
@@ -181,7 +181,7 @@ impl Block {
         let zero = splat(0.0);
         let statics = [sides[0].m.is(zero), sides[1].m.is(zero)];
         self.bits.moves = [!statics[0] & ALL, !statics[1] & ALL];
-        let per_second = splat(1.0 / parameters.time_step);
+        let per_second = splat(1.0) / splat(parameters.time_step);
         let (drift, coefficient) = (splat(parameters.drift), splat(parameters.coefficient));
         let Beside { mut spins, given } = beside;
         let mut sum = [zero; 3];

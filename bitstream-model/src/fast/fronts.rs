@@ -23,7 +23,7 @@ use pgs_support::lanes::{InstructionSet, Instructions, LANES, Work};
 use super::Plan;
 use super::block::{Beside, Block, BodyRow, Given, Spins};
 use super::groups::Groups;
-use crate::accelerator::arithmetic::number::Single;
+use crate::accelerator::arithmetic::number::{Half, Single};
 use crate::accelerator::per_record::fixed_impulse;
 use crate::cast::register;
 
@@ -98,7 +98,7 @@ impl Fronts {
             broken: AtomicBool::new(false),
             subnormal: AtomicBool::new(false),
             alone: crew.is_alone(),
-            instructions: InstructionSet::found(),
+            instructions: InstructionSet::found().in_binary16(plan.binary16),
         };
         if count > 0 && !blocks.is_empty() {
             crew.run(&|thread| {
@@ -284,7 +284,11 @@ impl Work for Chunk<'_> {
                 block.pass(instructions, stage, field.plan.damping, beside, field.bodies, spare);
             }
             if stage.contact && stage.turning {
-                let of = |lane| fixed_impulse::<Single>(&block.impulses_of(lane));
+                let fixed = match field.plan.binary16 {
+                    true => fixed_impulse::<Half>,
+                    false => fixed_impulse::<Single>,
+                };
+                let of = |lane| fixed(&block.impulses_of(lane));
                 sum = (0..LANES).fold(sum, |sum, lane| sum.saturating_add(of(lane)));
             }
         }

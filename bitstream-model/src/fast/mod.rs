@@ -38,6 +38,8 @@ struct Plan {
     damping: f32,
     /// Whether a subnormal number has the step taken again.
     watches: bool,
+    /// Whether the design computes in binary16, or else in f32.
+    binary16: bool,
 }
 
 /// The kind of a pass.
@@ -97,6 +99,8 @@ pub(crate) struct Fast {
     passing: Stream,
     /// Which bodies each collision moves; `None` for padding.
     entries: Vec<Option<Entry>>,
+    /// Collisions in sixteen bits as they would come in f32.
+    widened: read::Widened,
     /// In the way of one collision after the other: the collisions of each kind of pass.
     collisions: [Vec<Collision>; read::KINDS],
     order: order::Order,
@@ -133,6 +137,7 @@ impl Fast {
             counted: Vec::new(),
             passing: Stream::unread(),
             entries: Vec::new(),
+            widened: Default::default(),
             collisions: Default::default(),
             order: order::Order::new(config.queue_depth()),
             lanes: solve::Lanes::default(),
@@ -151,7 +156,9 @@ impl Fast {
         waits: bool,
         parts: &mut Parts<'_>,
     ) -> bool {
-        self.end = self.taken(ran, if waits { u64::MAX } else { until }, parts);
+        let mut widened = std::mem::take(&mut self.widened);
+        self.end = self.taken(ran, if waits { u64::MAX } else { until }, &mut widened, parts);
+        self.widened = widened;
         self.end.is_some()
     }
 
@@ -160,7 +167,13 @@ impl Fast {
         self.end.map(|end| end.at)
     }
 
-    fn taken(&mut self, ran: u64, until: u64, parts: &mut Parts<'_>) -> Option<End> {
+    fn taken(
+        &mut self,
+        ran: u64,
+        until: u64,
+        widened: &mut read::Widened,
+        parts: &mut Parts<'_>,
+    ) -> Option<End> {
         let Parts { now, accelerator, cores, inputs, outputs, arbiter, with } = parts;
         let debt = accelerator.loaded()?;
         let arguments = accelerator.arguments;
@@ -175,7 +188,7 @@ impl Fast {
         self.packets.find(accelerator, cores, &outgoing, with.memory)?;
         let ahead = self.packets.ahead(inputs)?;
         let input = self.packets.views(with.memory)?;
-        let usable = self.read_collisions(accelerator, &input)?;
+        let usable = self.read_collisions(accelerator, &input, widened)?;
         let (mut counters, course) = self.course(accelerator, *arbiter, (ran + debt, ahead));
         let end = *now + ran + debt + course.last_beat.max(course.cycles);
         if end >= until {
@@ -193,6 +206,7 @@ impl Fast {
             warm: arguments.warm_start,
             damping: arguments.solver.spin_damping,
             watches: self.config.profile.flushes_subnormals,
+            binary16: accelerator.variant.numbers == Numbers::BINARY16,
         };
         for (results, beats) in self.results.iter_mut().zip(outgoing) {
             results.clear();
@@ -203,7 +217,7 @@ impl Fast {
             None => Some(self.solve_one_by_one(accelerator, plan)),
         };
         let Some(impulse_sum) = solved else {
-            log::debug!("accelerator: a subnormal number, which the reference has to flush");
+            log::debug!("accelerator: a subnormal number, left to the reference");
             accelerator.forget_passes(input.velocities);
             return None;
         };

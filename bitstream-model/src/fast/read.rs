@@ -2,18 +2,21 @@
 
 use super::block::Records;
 use crate::accelerator::Accelerator;
-use crate::accelerator::records::array::Array;
+use crate::accelerator::records::array::{Array, Row};
+use crate::accelerator::records::decode::number;
+use crate::accelerator::records::segment::Reader;
 use crate::accelerator::records::striping::{PerStream, STREAMS_MAX};
 use crate::axi_dma::Core;
 use crate::axi_dma::chain::Piece;
 use crate::memory::Memory;
 use crate::stream::Stream;
 use pgs_interface::axi_dma::Direction;
-use pgs_interface::record::{BEAT_BYTES, Beat, collision};
+use pgs_interface::number::StreamFormat;
+use pgs_interface::record::{BEAT_BYTES, Beat, LANES, WORD_LANE, collision};
 use pgs_support::lanes::Quad;
 
 /// The number of a pass that surely is not warm: a step has fewer passes.
-pub(super) const COLD: u32 = u32::MAX - 1;
+const COLD: u32 = u32::MAX - 1;
 /// The kinds of passes by the packets that they bring: collisions alone, with normal impulses, and
 /// with impulses of friction.
 pub(super) const KINDS: usize = 3;
@@ -46,6 +49,11 @@ pub(super) fn kind(accelerator: &Accelerator, pass: u32) -> usize {
         true if pass < accelerator.arguments.contact_passes() => 1,
         true => 2,
     }
+}
+
+/// A pass of a kind.
+pub(super) fn pass_of(accelerator: &Accelerator, kind: usize) -> u32 {
+    [COLD, 0, accelerator.arguments.contact_passes()][kind]
 }
 
 /// Takes the pieces of the next packet, which lie one behind the other; `None` if they do not.
@@ -81,10 +89,8 @@ impl Packets {
         let arrays = [accelerator.velocities_in(), accelerator.poses_in()];
         let [velocities, poses] = arrays.each_ref().map(|segment| &segment.array().packets);
         let passes = accelerator.arguments.passes();
-        let warm = [0, accelerator.arguments.contact_passes()];
         let of_kind: [_; KINDS] = std::array::from_fn(|kind| {
-            let pass = if kind == 0 { COLD } else { warm[kind - 1] };
-            accelerator.collisions_in(pass).array().packets
+            accelerator.collisions_in(pass_of(accelerator, kind)).array().packets
         });
         let Self { receivers, chain, .. } = std::mem::take(self);
         *self = Self { receivers, ..Self::default() };
@@ -195,6 +201,14 @@ impl<'a> Rows<'a> {
         whole.then(|| Self { views, places, strides: array.striping.counts(array.rows) })
     }
 
+    /// Widened rows.
+    fn widened(rows: &'a [Beat]) -> Self {
+        let mut views: Views<'a> = [&[]; STREAMS_MAX];
+        views[0] = rows;
+        let places = std::array::from_fn(|row| (0, row));
+        Self { views, places, strides: [collision::WARM_ROWS; STREAMS_MAX] }
+    }
+
     #[inline(always)]
     fn row(&self, record: usize, row: usize) -> Beat {
         let (stream, number) = self.places[row];
@@ -211,6 +225,39 @@ impl<'a> Rows<'a> {
     }
 }
 
+/// Collisions of sixteen-bit words as they would come in f32, for each kind of pass: the rows of a
+/// warm pass, one after the other.
+pub(super) type Widened = [Vec<Beat>; KINDS];
+
+/// Widens the collisions of a kind of pass.
+fn widen(accelerator: &Accelerator, kind: usize, views: Views<'_>, to: &mut Vec<Beat>) {
+    let together = accelerator.variant.profile.collisions_per_issue as usize;
+    let segment = accelerator.collisions_in(pass_of(accelerator, kind));
+    let mut reader = Reader::new(segment.array(), 0, views);
+    let widened = |mut row: Row, numbers: usize| {
+        for word in &mut row[..numbers] {
+            *word = number(StreamFormat::Binary16, *word).to_bits();
+        }
+        Beat(row)
+    };
+    to.clear();
+    for _ in 0..segment.array().records.div_ceil(together) {
+        let first = to.len();
+        for _ in 0..together {
+            let rows: [Row; collision::ROWS] = reader.rows();
+            let numbers = |row| if row < collision::CONTACTS { WORD_LANE } else { LANES };
+            to.extend(rows.iter().enumerate().map(|(row, words)| widened(*words, numbers(row))));
+            to.push(Beat::default());
+        }
+        // Behind the records of an issue.
+        for record in 0..if kind > 0 { together } else { 0 } {
+            let [impulses] = reader.rows();
+            let at = first + record * collision::WARM_ROWS + collision::IMPULSES;
+            to[at] = widened(impulses, LANES);
+        }
+    }
+}
+
 /// Collisions in f32 and world coordinates, and the impulses that come in with them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Collisions<'a> {
@@ -220,21 +267,32 @@ pub(super) struct Collisions<'a> {
 
 impl<'a> Collisions<'a> {
     /// The collisions of a step. `None` if the passes bring different ones.
-    pub(super) fn new(accelerator: &Accelerator, input: &Input<'a>) -> Option<Self> {
+    pub(super) fn new(
+        accelerator: &Accelerator,
+        input: &Input<'a>,
+        widened: &'a mut Widened,
+    ) -> Option<Self> {
         let records = accelerator.arguments.collisions as usize;
-        let [usual, contact, friction] = input.collisions;
-        let of = |pass, views| Rows::new(accelerator.collisions_in(pass).array(), views);
-        let rows = of(COLD, usual?)?;
-        let mut warm = [None; 2];
-        let first = [0, accelerator.arguments.contact_passes()];
-        for (to, (views, pass)) in warm.iter_mut().zip([contact, friction].into_iter().zip(first)) {
-            if let Some(views) = views {
-                let kind = of(pass, views)?;
-                let same = |row| kind.has_row_of(&rows, records, row);
-                (0..collision::ROWS).all(same).then_some(())?;
-                *to = Some(kind);
-            }
+        let mut kinds = [None; KINDS];
+        for (kind, to) in widened.iter_mut().enumerate() {
+            let Some(views) = input.collisions[kind] else { continue };
+            kinds[kind] = match accelerator.variant.numbers.collisions {
+                StreamFormat::F32 => {
+                    let segment = accelerator.collisions_in(pass_of(accelerator, kind));
+                    Some(Rows::new(segment.array(), views)?)
+                }
+                StreamFormat::Binary16 => {
+                    widen(accelerator, kind, views, to);
+                    Some(Rows::widened(to))
+                }
+            };
         }
+        let mut different = kinds.iter().flatten();
+        let rows = *different.next()?;
+        let same =
+            |kind: &Rows<'_>| (0..collision::ROWS).all(|row| kind.has_row_of(&rows, records, row));
+        different.all(same).then_some(())?;
+        let [_, warm @ ..] = kinds;
         Some(Self { rows, warm })
     }
 
@@ -246,7 +304,7 @@ impl<'a> Collisions<'a> {
     /// The word beside a row's three numbers.
     #[inline(always)]
     pub(super) fn word(&self, collision: usize, row: usize) -> u32 {
-        self.rows.row(collision, row).0[pgs_interface::record::WORD_LANE]
+        self.rows.row(collision, row).0[WORD_LANE]
     }
 }
 

@@ -1,5 +1,5 @@
-//! Computes a step: collisions side by side where the design computes in f32, or else one after the
-//! other by the reference's own functions; then bodies.
+//! Computes a step: collisions side by side, or where they hardly fit so one after the other by the
+//! reference's own functions; then bodies.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -12,15 +12,15 @@ use super::block::{
 use super::fronts::Fronts;
 use super::groups::Groups;
 use super::order::Order;
-use super::read::{COLD, Collisions, Input, KINDS, Views, kind};
+use super::read::{Collisions, Input, KINDS, Views, Widened, kind, pass_of};
 use super::{Fast, Plan};
 use crate::accelerator::Accelerator;
-use crate::accelerator::records::decode::{self, Collision};
+use crate::accelerator::arithmetic::number::{Half, Number};
+use crate::accelerator::records::decode;
 use crate::accelerator::records::segment::Reader;
 use crate::accelerator::solver::Impulses;
 use crate::accelerator::state::Velocity;
 use pgs_interface::control::NUMBERS_PER_BEAT;
-use pgs_interface::number::Numbers;
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::{Beat, CONTACT_POINTS, collision};
 use pgs_interface::stripe::IMPULSES_STREAM;
@@ -41,66 +41,46 @@ pub(super) struct Lanes {
 }
 
 impl Fast {
-    /// Reads which bodies the collisions move, and places them side by side if lanes compute them:
-    /// then their records are returned. `None` if a collision is wrong.
+    /// Reads which bodies the collisions move, and places them side by side; returns their records
+    /// if lanes compute them. `None` if a collision is wrong.
     pub(super) fn read_collisions<'a>(
         &mut self,
         accelerator: &Accelerator,
         input: &Input<'a>,
+        widened: &'a mut Widened,
     ) -> Option<Option<Collisions<'a>>> {
         let count = accelerator.arguments.collisions as usize;
         let Self { entries, order, lanes: Lanes { groups, .. }, .. } = self;
         entries.clear();
         order.begin(accelerator);
-        if accelerator.variant.numbers == Numbers::F32 {
-            let records = Collisions::new(accelerator, input)?;
-            groups.begin(accelerator.velocities.len());
-            let friction = accelerator.arguments.solver.pair_friction;
-            let ignored = if friction { collision::FRICTION_BITS } else { 0 };
-            for at in 0..count {
-                let head = records.word(at, collision::NORMAL) & !ignored;
-                let rows = [collision::BODY_A, collision::BODY_B];
-                let bodies = rows.map(|row| records.word(at, row));
-                let entry = accelerator.entry(head as usize, bodies)?;
-                entries.push(entry);
-                if let Some(number) = order.enter(entry) {
-                    groups.place(number, entries[number as usize]);
-                }
-            }
-            while let Some(number) = order.leave() {
+        let records = Collisions::new(accelerator, input, widened)?;
+        groups.begin(accelerator.velocities.len());
+        let friction = accelerator.arguments.solver.pair_friction;
+        let ignored = if friction { collision::FRICTION_BITS } else { 0 };
+        for at in 0..count {
+            let head = records.word(at, collision::NORMAL) & !ignored;
+            let rows = [collision::BODY_A, collision::BODY_B];
+            let bodies = rows.map(|row| records.word(at, row));
+            let entry = accelerator.entry(head as usize, bodies)?;
+            entries.push(entry);
+            if let Some(number) = order.enter(entry) {
                 groups.place(number, entries[number as usize]);
             }
-            if !groups.wasteful() {
-                return Some(Some(records));
-            }
-            entries.clear();
-            order.begin(accelerator);
+        }
+        while let Some(number) = order.leave() {
+            groups.place(number, entries[number as usize]);
+        }
+        if !groups.wasteful() {
+            return Some(Some(records));
         }
         for number in 0..KINDS {
             self.collisions[number].clear();
             let Some(views) = input.collisions[number] else { continue };
-            let pass = match number {
-                0 => COLD,
-                1 => 0,
-                _ => accelerator.arguments.contact_passes(),
-            };
-            let segment = accelerator.collisions_in(pass);
+            let segment = accelerator.collisions_in(pass_of(accelerator, number));
             let mut reader = Reader::new(segment.array(), 0, views);
             let collisions = &mut self.collisions[number];
             accelerator.read_collisions(number > 0, &mut reader, collisions);
         }
-        // The same bodies in every pass, so that stalls are counted once.
-        let mut kinds = self.collisions.iter().filter(|collisions| !collisions.is_empty());
-        let first = kinds.next()?;
-        let same = |(one, other): (&Collision, &Collision)| one.head() == other.head();
-        kinds.all(|others| others.iter().zip(first).all(same)).then_some(())?;
-        for collision in first {
-            let (count, bodies) = collision.head();
-            let entry = accelerator.entry(count, bodies)?;
-            entries.push(entry);
-            order.enter(entry);
-        }
-        while order.leave().is_some() {}
         Some(None)
     }
 
@@ -124,7 +104,8 @@ impl Fast {
     }
 
     /// Solves the collisions side by side; returns the sum of the normal impulses, or `None` if a
-    /// subnormal number may have occurred on a board that flushes.
+    /// subnormal number may have occurred on a board that flushes, or binary16 has no number for a
+    /// mass.
     pub(super) fn solve_in_lanes(
         &mut self,
         accelerator: &mut Accelerator,
@@ -137,14 +118,23 @@ impl Fast {
         bodies.resize(ROWS_APART as usize, BodyRow::default());
         inertias.clear();
         let world = accelerator.variant.inertia == Inertia::World;
+        let stored = |number| match plan.binary16 {
+            true => Number::<Half>::new(number).value(),
+            false => number,
+        };
         if world {
             inertias.resize(ROWS_APART as usize, InertiaRow::default());
         }
         for (body, velocity) in accelerator.velocities.iter().enumerate() {
             let Velocity { linear: [x, y, z], angular: [p, q, r] } = *velocity;
             let mass = accelerator.mass_of(body);
-            let [xx, yy, zz, xy, xz, yz] = mass.inverse_inertia;
-            bodies.push([[x, y, z, mass.inverse_mass], [p, q, r, xx]]);
+            let [xx, yy, zz, xy, xz, yz] = mass.inverse_inertia.map(stored);
+            let inverse_mass = stored(mass.inverse_mass);
+            if inverse_mass == 0.0 && mass.inverse_mass != 0.0 {
+                // A body that moves, and is static to the solver.
+                return None;
+            }
+            bodies.push([[x, y, z, inverse_mass], [p, q, r, xx]]);
             if world {
                 inertias.push([[xx, yy, zz, 0.0], [xy, xz, yz, 0.0]]);
             }
@@ -170,7 +160,7 @@ impl Fast {
         let of_given = given.chunks_mut(OF_THREAD).map(Some).chain(std::iter::repeat_with(|| None));
         let beside = of_spins.zip(of_given).map(|(spins, given)| Beside { spins, given });
         let parts = groups.members.chunks(OF_THREAD).zip(blocks.chunks_mut(OF_THREAD)).zip(beside);
-        let set = InstructionSet::found();
+        let set = InstructionSet::found().in_binary16(plan.binary16);
         crew.each(parts, |((members, blocks), beside)| {
             let work = Prepare { records, members, blocks, beside, scene };
             let ((), none) = without_subnormals(plan.watches, || set.run(work));
@@ -202,7 +192,7 @@ impl Fast {
                         NONE => [0.0; CONTACT_POINTS],
                         slot => {
                             let slot = slot as usize;
-                            blocks[slot / LANES].impulses_of(slot % LANES)
+                            blocks[slot / LANES].impulses_of(slot % LANES).map(stored)
                         }
                     };
                     subnormal |= plan.watches && impulses.into_iter().any(f32::is_subnormal);

@@ -7,68 +7,21 @@ use pgs_interface::record::BEAT_BYTES;
 
 use crate::platform::{
     Access, DmaMemory, DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow,
-    SharedMemory,
+    Result, SharedMemory,
 };
 
 /// The emulated board from the side of its processor.
 #[derive(Debug)]
 pub(crate) struct EmulatedPlatform {
     port: CpuPort,
+    /// Where the guard begins, and its length, if the guard takes the place of the memory.
+    guard: Option<(u64, u64)>,
 }
 
 impl EmulatedPlatform {
     /// The board behind this port.
     pub(crate) fn new(port: CpuPort) -> Self {
-        Self { port }
-    }
-}
-
-/// The guard of the emulated board.
-#[derive(Debug)]
-struct EmulatedGuard {
-    board: EmulatedPlatform,
-    extent: (u64, u64),
-}
-
-impl DmaMemorySource for EmulatedGuard {
-    fn name(&self) -> &str {
-        "guard"
-    }
-
-    fn extent(&self) -> Option<(u64, u64)> {
-        Some(self.extent)
-    }
-
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
-        let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
-        let allocated = self.board.port.allocate_guard(beats);
-        let (address, beats) = allocated.map_err(refused("allocate", "bytes", bytes))?;
-        Ok((address, DmaMemory::Heap(beats)))
-    }
-
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
-        let bytes = words.saturating_mul(4) as u64;
-        let allocated = self.board.port.allocate_guard_shared(words);
-        let (address, words) = allocated.map_err(refused("allocate", "bytes", bytes))?;
-        Ok((address, SharedMemory::Heap(words)))
-    }
-
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        self.board.hand_over(address, memory, used, access)
-    }
-
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
-        self.board.take_back(address)
-    }
-
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
-        self.board.release(address)
+        Self { port, guard: None }
     }
 }
 
@@ -104,30 +57,34 @@ fn refused<E: std::error::Error + Send + Sync + 'static>(
 
 impl DmaMemorySource for EmulatedPlatform {
     fn name(&self) -> &str {
-        "emulated"
+        if self.guard.is_some() { "guard" } else { "emulated" }
     }
 
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+    fn extent(&self) -> Option<(u64, u64)> {
+        self.guard
+    }
+
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory)> {
         let bytes = beats.saturating_mul(BEAT_BYTES) as u64;
-        let allocated = self.port.allocate(beats);
+        let allocated = match self.guard {
+            Some(_) => self.port.allocate_guard(beats),
+            None => self.port.allocate(beats),
+        };
         let (address, beats) = allocated.map_err(refused("allocate", "bytes", bytes))?;
         Ok((address, DmaMemory::Heap(beats)))
     }
 
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory)> {
         let bytes = words.saturating_mul(4) as u64;
-        let allocated = self.port.allocate_shared(words);
+        let allocated = match self.guard {
+            Some(_) => self.port.allocate_guard_shared(words),
+            None => self.port.allocate_shared(words),
+        };
         let (address, words) = allocated.map_err(refused("allocate", "bytes", bytes))?;
         Ok((address, SharedMemory::Heap(words)))
     }
 
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()> {
         let DmaMemory::Heap(beats) = memory else {
             unreachable!("a buffer goes back to the platform that it came from");
         };
@@ -135,25 +92,22 @@ impl DmaMemorySource for EmulatedPlatform {
             Access::Read => DeviceAccess::Read,
             Access::Write => DeviceAccess::Write,
         };
-        self.port.hand_over_first(address, beats, used, access).map_err(refused(
-            "hand over",
-            "address",
-            address,
-        ))
+        let given = self.port.hand_over_first(at, beats, used, access);
+        given.map_err(refused("hand over", "address", at))
     }
 
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+    fn take_back(&self, address: u64) -> Result<DmaMemory> {
         let taken = self.port.take_back(address);
         Ok(DmaMemory::Heap(taken.map_err(refused("take back", "address", address))?))
     }
 
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
+    fn release(&self, address: u64) -> Result<()> {
         self.port.release(address).map_err(refused("free", "address", address))
     }
 }
 
 impl Platform for EmulatedPlatform {
-    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
         let (base, bytes) = map.place();
         Ok(Box::new(EmulatedWindow { port: self.port.clone(), base, bytes }))
     }
@@ -162,10 +116,11 @@ impl Platform for EmulatedPlatform {
         self
     }
 
-    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
-        let board = Self { port: self.port.clone() };
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>> {
+        let port = self.port.clone();
         Ok(self.port.guard().map(|guard| -> Box<dyn DmaMemorySource> {
-            Box::new(EmulatedGuard { board, extent: (guard.start, guard.end - guard.start) })
+            let guard = Some((guard.start, guard.end - guard.start));
+            Box::new(Self { port, guard })
         }))
     }
 
@@ -177,11 +132,11 @@ impl Platform for EmulatedPlatform {
         self.port.pause(duration);
     }
 
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>> {
         Ok(self.port.wait_interrupt(timeout))
     }
 
-    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+    fn unmask_interrupt(&self) -> Result<()> {
         self.port.unmask_interrupt();
         Ok(())
     }

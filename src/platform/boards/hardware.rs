@@ -19,7 +19,7 @@ use crate::platform::memory::pool::{Pool, Region};
 use crate::platform::memory::u_dma_buf::UDmaBuf;
 use crate::platform::{
     DmaMemorySource, ManagerChoice, Platform, PlatformError, RegisterMap, RegisterWindow,
-    ReservedMemory, System, UioDevice,
+    ReservedMemory, Result, System, UioDevice,
 };
 
 /// Where a real board's memory for DMA comes from.
@@ -122,7 +122,7 @@ impl HardwarePlatform {
         registers: RegisterChoice,
         memory: &MemoryChoice,
         manager: &ManagerChoice,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         let window = match (memory, &registers) {
             (MemoryChoice::DevMem { window }, _) => Some(window.clone()),
             (MemoryChoice::Automatic, RegisterChoice::DevMem(windows)) => {
@@ -177,10 +177,7 @@ impl HardwarePlatform {
     }
 
     /// Goes on without the interrupt if the node has none.
-    fn with_interrupt<T>(
-        &self,
-        act: impl FnOnce(&UioDevice) -> Result<T, PlatformError>,
-    ) -> Result<Option<T>, PlatformError> {
+    fn with_interrupt<T>(&self, act: impl FnOnce(&UioDevice) -> Result<T>) -> Result<Option<T>> {
         self.lost().map_or(Ok(()), Err)?;
         let Some(device) = self.interrupt() else { return Ok(None) };
         match act(device) {
@@ -195,7 +192,7 @@ impl HardwarePlatform {
     }
 
     /// The registers of a region, mapped.
-    fn registers_of(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    fn registers_of(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
         let region = match map {
             RegisterMap::Dma(core) => UIO_DMA_MAPS.get(core).copied().unwrap_or_default(),
             RegisterMap::Control => UIO_CONTROL_MAP,
@@ -228,7 +225,7 @@ impl HardwarePlatform {
     }
 
     /// Asks the kernel for everything that it can take away: the logic's state, and each node.
-    fn ask(&self) -> Result<(), PlatformError> {
+    fn ask(&self) -> Result<()> {
         self.logic.check()?;
         match &self.registers {
             Registers::OneNode(device) => device.check(),
@@ -250,7 +247,7 @@ impl HardwarePlatform {
 }
 
 /// Opens the node of that name, or the nodes `<name>-control`, `<name>-dma0` and so on.
-fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
+fn open_uio(system: &System, name: &str) -> Result<Registers> {
     let mut listing = uio_listing(&system.uio)?;
     let control = part_name(name, UIO_CONTROL_MAP);
     if listing.has(name) || !listing.has(&control) {
@@ -272,11 +269,11 @@ fn open_uio(system: &System, name: &str) -> Result<Registers, PlatformError> {
 
 /// Opens a u-dma-buf or the memory of a UIO node. Its device file is locked as long as the region,
 /// or a piece of it, exists.
-fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>, PlatformError> {
-    let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>, PlatformError> {
+fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>> {
+    let u_dma_buf = |name: &str, caching| -> Result<Box<dyn Region>> {
         Ok(Box::new(UDmaBuf::open(system, name, caching)?))
     };
-    let uio = |node: &str| -> Result<Box<dyn Region>, PlatformError> {
+    let uio = |node: &str| -> Result<Box<dyn Region>> {
         Ok(Box::new(ReservedMemory::open_in(system, node)?))
     };
     match choice {
@@ -289,7 +286,7 @@ fn open_memory(system: &System, choice: &MemoryChoice) -> Result<Box<dyn Region>
 }
 
 impl Platform for HardwarePlatform {
-    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
         let registers = self.registers_of(map)?;
         Ok(Box::new(UnlessLost { registers, lost: Arc::clone(&self.lost) }))
     }
@@ -298,7 +295,7 @@ impl Platform for HardwarePlatform {
         &self.pool
     }
 
-    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>, PlatformError> {
+    fn guard(&self) -> Result<Option<Box<dyn DmaMemorySource>>> {
         if !uio_listing(&self.system.uio)?.has(UIO_GUARD_NODE) {
             return Ok(None);
         }
@@ -320,7 +317,7 @@ impl Platform for HardwarePlatform {
         }
     }
 
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>> {
         if let Some(came) = self.with_interrupt(|device| device.wait_interrupt(timeout))? {
             return Ok(came);
         }
@@ -329,7 +326,7 @@ impl Platform for HardwarePlatform {
         self.check_present().map(|()| None)
     }
 
-    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+    fn unmask_interrupt(&self) -> Result<()> {
         self.with_interrupt(UioDevice::unmask).map(|_| ())
     }
 
@@ -338,7 +335,7 @@ impl Platform for HardwarePlatform {
     }
 
     /// Two system calls for one node, one for each further node.
-    fn check_present(&self) -> Result<(), PlatformError> {
+    fn check_present(&self) -> Result<()> {
         self.lost().map_or(Ok(()), Err)?;
         self.ask().map_err(|error| self.noted(error))
     }

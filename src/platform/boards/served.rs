@@ -19,7 +19,7 @@ use pgs_interface::message::{ANSWER_BYTES, Answer, MEMORY_UNIT, Request, Status,
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::memory::pool::Pool;
 use crate::platform::{
-    DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory,
+    DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow, ReservedMemory, Result,
 };
 
 /// Longest wait of one request, shorter than the protocol allows: a simulator of the accelerator
@@ -42,12 +42,12 @@ pub(crate) struct RemotePlatform {
 
 impl RemotePlatform {
     /// Connects to the board served at `socket`. No register is touched.
-    pub(crate) fn open(socket: &Path) -> Result<Self, PlatformError> {
+    pub(crate) fn open(socket: &Path) -> Result<Self> {
         Self::open_within(socket, HELLO_LIMIT)
     }
 
     /// The same for a board that answers the hello within `limit`.
-    fn open_within(socket: &Path, limit: Duration) -> Result<Self, PlatformError> {
+    fn open_within(socket: &Path, limit: Duration) -> Result<Self> {
         let line = Line::connect(socket, limit)?;
         let hello = line.hello(limit)?;
         let socket = || socket.to_owned();
@@ -129,7 +129,7 @@ impl fmt::Debug for Line {
 }
 
 impl Line {
-    fn connect(socket: &Path, limit: Duration) -> Result<Self, PlatformError> {
+    fn connect(socket: &Path, limit: Duration) -> Result<Self> {
         let stream = connect(socket, limit)
             .map_err(|source| PlatformError::NoServer { socket: socket.to_owned(), source })?;
         let state = State { stream, limit, now: Duration::ZERO, lost: None };
@@ -139,7 +139,7 @@ impl Line {
     }
 
     /// Bounds every request and its answer from here on.
-    fn set_limit(&self, limit: Duration) -> Result<(), PlatformError> {
+    fn set_limit(&self, limit: Duration) -> Result<()> {
         let mut state = self.state();
         state.limit = limit;
         let set = state.stream.set_write_timeout(Some(limit));
@@ -148,7 +148,7 @@ impl Line {
     }
 
     /// The first request. A board that does not answer it is silent, not lost: no step has begun.
-    fn hello(&self, limit: Duration) -> Result<Answer, PlatformError> {
+    fn hello(&self, limit: Duration) -> Result<Answer> {
         self.ask(Request::Hello { version: VERSION }).map_err(|error| match &error {
             PlatformError::ServerLost { socket, source }
                 if source.kind() == io::ErrorKind::TimedOut =>
@@ -165,13 +165,13 @@ impl Line {
     }
 
     /// One request and its answer.
-    fn ask(&self, request: Request) -> Result<Answer, PlatformError> {
+    fn ask(&self, request: Request) -> Result<Answer> {
         self.exchange(request).map(|(answer, _)| answer)
     }
 
     /// One request, its answer, and the files that come beside it. After the first failure the
     /// board is lost for good.
-    fn exchange(&self, request: Request) -> Result<(Answer, Vec<File>), PlatformError> {
+    fn exchange(&self, request: Request) -> Result<(Answer, Vec<File>)> {
         let mut state = self.state();
         if state.lost.is_none() {
             let limit = state.limit;
@@ -280,7 +280,7 @@ impl RegisterWindow for RemoteWindow {
 }
 
 impl Platform for RemotePlatform {
-    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
         let (base, bytes) = map.place();
         Ok(Box::new(RemoteWindow { line: Arc::clone(&self.line), base, bytes }))
     }
@@ -306,7 +306,7 @@ impl Platform for RemotePlatform {
         }
     }
 
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>> {
         let mut left = timeout;
         loop {
             let time = left.min(ONE_WAIT);
@@ -320,7 +320,7 @@ impl Platform for RemotePlatform {
         }
     }
 
-    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+    fn unmask_interrupt(&self) -> Result<()> {
         self.line.ask(Request::Unmask).map(|_| ())
     }
 

@@ -23,7 +23,9 @@ use super::system::page_bytes;
 use super::uio_device::NodeEntry;
 use super::uio_listing::uio_listing;
 use crate::platform::memory::u_dma_buf::directory;
-use crate::platform::{PlatformError, RegisterMap, ReservedMemory, System, u_dma_buf_names};
+use crate::platform::{
+    PlatformError, RegisterMap, ReservedMemory, Result, System, u_dma_buf_names,
+};
 
 /// The windows that a board may use of `/dev/mem`. The default is the address map of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,7 +83,7 @@ pub(crate) struct DevMem {
 
 impl DevMem {
     /// Opens `/dev/mem` to map these windows and nothing else.
-    pub(crate) fn open(system: &System, windows: Vec<Range<u64>>) -> Result<Self, PlatformError> {
+    pub(crate) fn open(system: &System, windows: Vec<Range<u64>>) -> Result<Self> {
         let first = windows.first().map_or(0, |window| window.start);
         let file = LockedFile::open(&system.dev.join("mem"), nix::libc::O_SYNC)
             .map_err(|error| refused("opened", first, error))?;
@@ -93,12 +95,12 @@ impl DevMem {
 
     /// Makes sure that the UIO nodes which show memory of the windows are still there: with its
     /// node the logic may lose its clock.
-    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+    pub(crate) fn check(&self) -> Result<()> {
         self.nodes.iter().try_for_each(NodeEntry::check)
     }
 
     /// Maps a range.
-    pub(crate) fn map(&self, wanted: &Range<u64>) -> Result<Mapping, PlatformError> {
+    pub(crate) fn map(&self, wanted: &Range<u64>) -> Result<Mapping> {
         let (address, bytes) = (wanted.start, wanted.end.saturating_sub(wanted.start));
         let inside = |window: &Range<u64>| window.start <= wanted.start && wanted.end <= window.end;
         if bytes == 0 || !self.windows.iter().any(inside) {
@@ -120,7 +122,7 @@ impl DevMem {
     }
 
     /// Maps memory for DMA.
-    pub(crate) fn memory(&self, wanted: &Range<u64>) -> Result<ReservedMemory, PlatformError> {
+    pub(crate) fn memory(&self, wanted: &Range<u64>) -> Result<ReservedMemory> {
         ReservedMemory::new(self.map(wanted)?, wanted.start, "of /dev/mem".to_owned())
     }
 }
@@ -131,7 +133,7 @@ impl DevMem {
 fn lock_others(
     system: &System,
     windows: &[Range<u64>],
-) -> Result<(Vec<LockedFile>, Vec<NodeEntry>), PlatformError> {
+) -> Result<(Vec<LockedFile>, Vec<NodeEntry>)> {
     let shown = |start: u64, bytes: u64| {
         let shown = start..start.saturating_add(bytes);
         windows.iter().any(|window| overlap(window, &shown))
@@ -205,7 +207,7 @@ mod tests {
     use pgs_interface::record::Beat;
 
     /// Opens it for registers and memory.
-    fn open(system: &System, windows: &DevMemWindows) -> Result<DevMem, PlatformError> {
+    fn open(system: &System, windows: &DevMemWindows) -> Result<DevMem> {
         let mut wanted = windows.registers();
         wanted.push(windows.memory.clone());
         DevMem::open(system, wanted)

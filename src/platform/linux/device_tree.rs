@@ -11,15 +11,15 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::platform::PlatformError;
+use crate::platform::{PlatformError, Result};
 
 /// Lengths of the regions in the `reg` of a device-tree node, a folder, by number. `None` without a
 /// node or a `reg`: the device does not come from a device tree.
-pub(crate) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>, PlatformError> {
+pub(crate) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>> {
     let path = node.join("reg");
     let Some(reg) = bytes(&path)? else { return Ok(None) };
     // `..` after the link is the parent in the tree.
-    let cells = |name: &str, default| -> Result<usize, PlatformError> {
+    let cells = |name: &str, default| -> Result<usize> {
         let path = node.join("..").join(name);
         let Some(found) = bytes(&path)? else { return Ok(default) };
         match <[u8; 4]>::try_from(found.as_slice()).map(u32::from_be_bytes) {
@@ -39,7 +39,7 @@ pub(crate) fn region_lengths(node: &Path) -> Result<Option<Vec<u64>>, PlatformEr
 }
 
 /// The bytes of a property, if it exists.
-fn bytes(path: &Path) -> Result<Option<Vec<u8>>, PlatformError> {
+fn bytes(path: &Path) -> Result<Option<Vec<u8>>> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(source) if source.kind() == io::ErrorKind::NotFound => Ok(None),

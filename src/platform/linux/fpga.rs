@@ -11,7 +11,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::sysfs::{Attribute, numbered, read};
-use crate::platform::{PlatformError, System, ZYNQMP_MANAGER};
+use crate::platform::{PlatformError, Result, System, ZYNQMP_MANAGER};
 
 /// The state of programmable logic that is ready.
 const OPERATING: &str = "operating";
@@ -122,7 +122,7 @@ pub(crate) struct LogicState(Option<Attribute>);
 
 impl LogicState {
     /// As [`require_bitstream`]; the state can be asked again.
-    pub(crate) fn open(system: &System, choice: &ManagerChoice) -> Result<Self, PlatformError> {
+    pub(crate) fn open(system: &System, choice: &ManagerChoice) -> Result<Self> {
         let class = &system.fpga_manager;
         let Some(manager) = find_manager(class, choice)? else {
             if *choice == ManagerChoice::Unasked {
@@ -146,7 +146,7 @@ impl LogicState {
     }
 
     /// Makes sure that the logic is still programmed: at most one system call.
-    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+    pub(crate) fn check(&self) -> Result<()> {
         match (self.other()?, &self.0) {
             (Some(found), Some(state)) => {
                 let path = state.path().display();
@@ -159,7 +159,7 @@ impl LogicState {
 
     /// The state, unless it is [`OPERATING`] or there is nobody to ask, as after the manager's own
     /// driver was unbound.
-    fn other(&self) -> Result<Option<String>, PlatformError> {
+    fn other(&self) -> Result<Option<String>> {
         let Some(state) = &self.0 else { return Ok(None) };
         state.read(|text| {
             let other = text?.trim_ascii();
@@ -194,7 +194,7 @@ mod tests {
 
     const SELECT_MAP: &str = "Xilinx Slave SelectMap FPGA Manager";
 
-    fn ask(system: &System) -> Result<(), PlatformError> {
+    fn ask(system: &System) -> Result<()> {
         require_bitstream(system, &ManagerChoice::Automatic)
     }
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use pgs_support::Process;
 
 use super::system::open_device;
-use crate::platform::PlatformError;
+use crate::platform::{PlatformError, Result};
 
 /// An open device file with its lock, which is released on drop.
 #[derive(Debug)]
@@ -28,12 +28,12 @@ impl LockedFile {
     /// Opens and locks a device file to read and write; `flags` as for `open`.
     ///
     /// [`PlatformError::Busy`] if the file is locked already.
-    pub(crate) fn open(path: &Path, flags: i32) -> Result<Self, PlatformError> {
+    pub(crate) fn open(path: &Path, flags: i32) -> Result<Self> {
         Self::of_file(open_device(path, flags)?, path)
     }
 
     /// Locks an open file.
-    pub(crate) fn of_file(file: File, path: &Path) -> Result<Self, PlatformError> {
+    pub(crate) fn of_file(file: File, path: &Path) -> Result<Self> {
         let path = path.to_owned();
         match file.try_lock() {
             Ok(()) => Ok(Self { file, path, process: Process::this(), others: Vec::new() }),

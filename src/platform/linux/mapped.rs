@@ -12,7 +12,7 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use super::lock::LockedFile;
 use super::system::require_bytes;
 use crate::platform::memory::copy::Doublewords;
-use crate::platform::{PlatformError, RegisterWindow};
+use crate::platform::{PlatformError, RegisterWindow, Result};
 
 /// The longest mapping, bytes: all physical addresses of the chip (UG1085, 40 bits).
 const LONGEST: u64 = 1 << 40;
@@ -47,7 +47,7 @@ impl Mapping {
         file_offset: u64,
         start: usize,
         bytes: usize,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         Self::of_file(lock, lock.file(), file_offset, start, bytes)
     }
 
@@ -58,7 +58,7 @@ impl Mapping {
         file_offset: u64,
         start: usize,
         bytes: usize,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         let map = Self::map(file, lock.path(), file_offset, start, bytes)?;
         Ok(Self { _lock: Some(Arc::clone(lock)), ..map })
     }
@@ -66,21 +66,11 @@ impl Mapping {
     /// Maps the first `bytes` bytes of a file that nobody else in this process has, and that cannot
     /// get shorter; `path` names it in errors.
     #[cfg(feature = "emulation")]
-    pub(crate) fn of_private(
-        file: &File,
-        path: &Path,
-        bytes: usize,
-    ) -> Result<Self, PlatformError> {
+    pub(crate) fn of_private(file: &File, path: &Path, bytes: usize) -> Result<Self> {
         Self::map(file, path, 0, 0, bytes)
     }
 
-    fn map(
-        file: &File,
-        path: &Path,
-        file_offset: u64,
-        start: usize,
-        bytes: usize,
-    ) -> Result<Self, PlatformError> {
+    fn map(file: &File, path: &Path, file_offset: u64, start: usize, bytes: usize) -> Result<Self> {
         let error = |source| PlatformError::File { act: "map", path: path.to_owned(), source };
         if !start.is_multiple_of(BEAT_BYTES) || bytes < 4 {
             let text = format!("a region of {bytes} bytes at {start} cannot be mapped");
@@ -205,11 +195,7 @@ mod tests {
         file
     }
 
-    fn map(
-        file: &tempfile::NamedTempFile,
-        start: usize,
-        bytes: usize,
-    ) -> Result<Mapping, PlatformError> {
+    fn map(file: &tempfile::NamedTempFile, start: usize, bytes: usize) -> Result<Mapping> {
         let lock = Arc::new(LockedFile::open(file.path(), 0).expect("nobody else has it"));
         Mapping::new(&lock, 0, start, bytes)
     }

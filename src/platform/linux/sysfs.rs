@@ -7,13 +7,10 @@ use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
 
-use crate::platform::PlatformError;
+use crate::platform::{PlatformError, Result};
 
 /// The entries `<prefix><number>` of a directory, by number; none if there is no such directory.
-pub(crate) fn numbered(
-    directory: &Path,
-    prefix: &str,
-) -> Result<Vec<(u32, PathBuf)>, PlatformError> {
+pub(crate) fn numbered(directory: &Path, prefix: &str) -> Result<Vec<(u32, PathBuf)>> {
     let error = |source| PlatformError::File { act: "list", path: directory.to_owned(), source };
     let entries = match fs::read_dir(directory) {
         Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -33,7 +30,7 @@ pub(crate) fn numbered(
 }
 
 /// The text of a file, without white space around it.
-pub(crate) fn read(path: &Path) -> Result<String, PlatformError> {
+pub(crate) fn read(path: &Path) -> Result<String> {
     let text = fs::read_to_string(path).map_err(|source| PlatformError::File {
         act: "read",
         path: path.to_owned(),
@@ -43,7 +40,7 @@ pub(crate) fn read(path: &Path) -> Result<String, PlatformError> {
 }
 
 /// The text of a file that may be absent.
-pub(crate) fn read_if_present(path: &Path) -> Result<Option<String>, PlatformError> {
+pub(crate) fn read_if_present(path: &Path) -> Result<Option<String>> {
     match read(path) {
         Err(PlatformError::File { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
             Ok(None)
@@ -53,7 +50,7 @@ pub(crate) fn read_if_present(path: &Path) -> Result<Option<String>, PlatformErr
 }
 
 /// The number in a file, decimal or with `0x`.
-pub(crate) fn read_number(path: &Path) -> Result<u64, PlatformError> {
+pub(crate) fn read_number(path: &Path) -> Result<u64> {
     let text = read(path)?;
     let number = match text.strip_prefix("0x") {
         Some(digits) => u64::from_str_radix(digits, 16),
@@ -81,7 +78,7 @@ const TEXT_BYTES: usize = 64;
 
 impl Attribute {
     /// Opens an attribute that may be absent.
-    pub(crate) fn open(path: PathBuf) -> Result<Option<Self>, PlatformError> {
+    pub(crate) fn open(path: PathBuf) -> Result<Option<Self>> {
         match File::open(&path) {
             Ok(file) => Ok(Some(Self { file, path })),
             Err(source) if source.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -90,7 +87,7 @@ impl Attribute {
     }
 
     /// Hands over its bytes of now; `None` once its device is gone. One system call, no allocation.
-    pub(crate) fn read<T>(&self, see: impl FnOnce(Option<&[u8]>) -> T) -> Result<T, PlatformError> {
+    pub(crate) fn read<T>(&self, see: impl FnOnce(Option<&[u8]>) -> T) -> Result<T> {
         let mut text = [0; TEXT_BYTES];
         match self.file.read_at(&mut text, 0) {
             Ok(bytes) => Ok(see(Some(&text[..bytes]))),

@@ -5,7 +5,7 @@ use std::io;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-use crate::platform::{PlatformError, UioMap, UioNode};
+use crate::platform::{PlatformError, Result, UioMap, UioNode};
 
 /// Where Linux lists the UIO nodes.
 pub const UIO_CLASS: &str = "/sys/class/uio";
@@ -50,7 +50,7 @@ impl Default for System {
 }
 
 /// Opens a device file to read and write; `flags` as for `open`.
-pub(crate) fn open_device(path: &Path, flags: i32) -> Result<File, PlatformError> {
+pub(crate) fn open_device(path: &Path, flags: i32) -> Result<File> {
     let file = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
     file.map_err(|source| obstacle(path, source))
 }
@@ -69,7 +69,7 @@ pub fn try_node(system: &System, node: &UioNode) -> Result<(), PlatformError> {
 
 /// Refuses a plain file that is shorter than the device whose place it takes: an access past its
 /// end ends the process.
-pub(crate) fn require_bytes(file: &File, path: &Path, expected: u64) -> Result<(), PlatformError> {
+pub(crate) fn require_bytes(file: &File, path: &Path, expected: u64) -> Result<()> {
     let metadata = file.metadata().map_err(|source| obstacle(path, source))?;
     if metadata.is_file() && metadata.len() < expected {
         let (path, found) = (path.to_owned(), metadata.len());
@@ -89,7 +89,7 @@ pub(crate) fn obstacle(path: &Path, source: io::Error) -> PlatformError {
 }
 
 /// The system's page size; an error names `path`, the file to be mapped.
-pub(crate) fn page_bytes(path: &Path) -> Result<u64, PlatformError> {
+pub(crate) fn page_bytes(path: &Path) -> Result<u64> {
     let bytes = nix::unistd::sysconf(nix::unistd::SysconfVar::PAGE_SIZE);
     let source = match bytes {
         Ok(Some(bytes)) if bytes > 0 => return Ok(bytes.unsigned_abs()),

@@ -10,7 +10,7 @@ use pgs_interface::address_map::{
     dma_base, is_in_logic,
 };
 
-use crate::platform::PlatformError;
+use crate::platform::{PlatformError, Result};
 
 /// One region of a UIO node.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl UioNode {
     }
 
     /// The region of that name, or the only region of the node, whatever its name.
-    pub(crate) fn map_or_only(&self, name: &str) -> Result<&UioMap, PlatformError> {
+    pub(crate) fn map_or_only(&self, name: &str) -> Result<&UioMap> {
         match self.maps.as_slice() {
             [only] => Ok(only),
             _ => self.map(name),

@@ -21,7 +21,7 @@ use super::lock::LockedFile;
 use super::sysfs::Attribute;
 use super::uio_listing::uio_listing;
 use super::uio_window::Claims;
-use crate::platform::{PlatformError, System, UioMap, UioNode, UioWindow};
+use crate::platform::{PlatformError, Result, System, UioMap, UioNode, UioWindow};
 
 /// An open UIO node.
 ///
@@ -53,13 +53,13 @@ pub(crate) struct NodeEntry {
 
 impl NodeEntry {
     /// The entry of a node of the listing.
-    pub(crate) fn open(system: &System, node: &UioNode) -> Result<Self, PlatformError> {
+    pub(crate) fn open(system: &System, node: &UioNode) -> Result<Self> {
         let name = Attribute::open(system.uio.join(&node.device).join("name"))?;
         Ok(Self { name, text: format!("UIO node {:?} ({})", node.name, node.device) })
     }
 
     /// Makes sure that the node is still there: one system call.
-    pub(crate) fn check(&self) -> Result<(), PlatformError> {
+    pub(crate) fn check(&self) -> Result<()> {
         let Some(name) = &self.name else { return Err(self.lost()) };
         let there = name.read(|text| text.is_some_and(|text| !text.is_empty()))?;
         if there { Ok(()) } else { Err(self.lost()) }
@@ -95,7 +95,7 @@ impl UioDevice {
     }
 
     /// Opens a node of the listing.
-    pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self, PlatformError> {
+    pub(crate) fn of_node(system: &System, node: UioNode) -> Result<Self> {
         // Without O_NONBLOCK the read would block for ever if another reader takes the interrupt
         // after `poll`.
         let file = LockedFile::open(&system.dev.join(&node.device), nix::libc::O_NONBLOCK)?;
@@ -138,7 +138,7 @@ impl UioDevice {
     }
 
     /// Maps a region.
-    pub(crate) fn map(&self, map: &UioMap) -> Result<UioWindow, PlatformError> {
+    pub(crate) fn map(&self, map: &UioMap) -> Result<UioWindow> {
         UioWindow::new(&self.file, &self.node, map, &self.tree, &self.claims)
     }
 
@@ -198,7 +198,7 @@ impl UioDevice {
         self.control(0)
     }
 
-    fn control(&self, enable: u32) -> Result<(), PlatformError> {
+    fn control(&self, enable: u32) -> Result<()> {
         match self.file.file().write(&enable.to_ne_bytes()) {
             Ok(4) => {
                 self.interrupt.store(true, Ordering::Relaxed);

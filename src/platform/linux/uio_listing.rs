@@ -5,7 +5,7 @@ use std::path::Path;
 use pgs_interface::address_map::UIO_CONTROL_MAP;
 
 use super::sysfs::{is_gone, numbered, read, read_if_present, read_number};
-use crate::platform::{NodePart, PlatformError, UioMap, UioNode};
+use crate::platform::{NodePart, PlatformError, Result, UioMap, UioNode};
 
 /// A UIO node whose description cannot be read.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ impl UioListing {
     }
 
     /// The one node of that name.
-    pub(crate) fn node(&mut self, name: &str) -> Result<UioNode, PlatformError> {
+    pub(crate) fn node(&mut self, name: &str) -> Result<UioNode> {
         let unreadable = self.unreadable.iter().position(|node| node.name.as_deref() == Some(name));
         if let Some(at) = unreadable {
             return Err(self.unreadable.remove(at).error);
@@ -144,7 +144,7 @@ pub fn uio_nodes(class: &Path) -> Result<Vec<UioNode>, PlatformError> {
 }
 
 /// The regions of a node, by number.
-fn maps(node: &Path) -> Result<Vec<UioMap>, PlatformError> {
+fn maps(node: &Path) -> Result<Vec<UioMap>> {
     let map = |(index, map): (u32, std::path::PathBuf)| {
         Ok(UioMap {
             index,

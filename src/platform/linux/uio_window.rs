@@ -10,7 +10,7 @@ use super::device_tree::region_lengths;
 use super::lock::LockedFile;
 use super::mapped::Mapping;
 use super::system::page_bytes;
-use crate::platform::{PlatformError, RegisterWindow, UioMap, UioNode};
+use crate::platform::{PlatformError, RegisterWindow, Result, UioMap, UioNode};
 
 /// A mapped region of registers.
 ///
@@ -35,7 +35,7 @@ impl UioWindow {
         map: &UioMap,
         tree: &Path,
         claims: &Claims,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         let Some(claim) = claims.claim(map.index) else {
             let (node, map) = (node.name.clone(), map.name.clone());
             return Err(PlatformError::MappedAlready { node, map });
@@ -89,7 +89,7 @@ impl UioWindow {
         Ok(())
     }
 
-    fn checked(&self, at: u32) -> Result<usize, PlatformError> {
+    fn checked(&self, at: u32) -> Result<usize> {
         if at.is_multiple_of(4) && u64::from(at) + 4 <= self.bytes() {
             return Ok(at as usize);
         }
@@ -133,7 +133,7 @@ impl From<UioWindow> for Box<dyn RegisterWindow> {
 
 /// Length of a region: exact by the device tree, else by the kernel, which counts whole pages from
 /// the start of the first page.
-fn length(map: &UioMap, name: &str, tree: &Path, page: u64) -> Result<u64, PlatformError> {
+fn length(map: &UioMap, name: &str, tree: &Path, page: u64) -> Result<u64> {
     let kernel = map.bytes.saturating_sub(map.offset);
     let bytes = match region_lengths(tree)? {
         None => kernel,

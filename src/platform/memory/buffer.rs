@@ -16,7 +16,7 @@ use pgs_interface::record::{BEAT_BYTES, Beat};
 use pgs_support::Process;
 
 use crate::platform::{
-    Access, DmaMemory, Platform, PlatformError, SharedMemory, acquire_from_device,
+    Access, DmaMemory, Platform, PlatformError, Result, SharedMemory, acquire_from_device,
     release_to_device,
 };
 
@@ -53,7 +53,7 @@ pub(crate) struct Reach {
 
 impl Reach {
     /// Refuses memory of `region` that the cores do not reach.
-    pub(crate) fn check(self, region: &str, address: u64, bytes: u64) -> Result<(), PlatformError> {
+    pub(crate) fn check(self, region: &str, address: u64, bytes: u64) -> Result<()> {
         let Self { address_width, fence } = self;
         let end = address.checked_add(bytes);
         let reachable = match 1u64.checked_shl(address_width) {
@@ -98,19 +98,14 @@ struct Allocation {
 }
 
 impl Allocation {
-    fn new(
-        platform: &Arc<dyn Platform>,
-        address: u64,
-        bytes: u64,
-        reach: Reach,
-    ) -> Result<Self, PlatformError> {
+    fn new(platform: &Arc<dyn Platform>, address: u64, bytes: u64, reach: Reach) -> Result<Self> {
         let platform = Arc::clone(platform);
         let this = Self { platform, address, bytes, owner: Owner::Cpu, process: Process::this() };
         reach.check(this.platform.memory().name(), address, bytes)?;
         Ok(this)
     }
 
-    fn range(&self, offset: u64, bytes: u64) -> Result<BusAddress, PlatformError> {
+    fn range(&self, offset: u64, bytes: u64) -> Result<BusAddress> {
         match offset.checked_add(bytes) {
             Some(end) if end <= self.bytes => Ok(BusAddress(self.address + offset)),
             _ => Err(PlatformError::OutOfBuffer { offset, bytes, buffer_bytes: self.bytes }),
@@ -153,7 +148,7 @@ impl CpuBuffer {
         platform: &Arc<dyn Platform>,
         beats: usize,
         reach: Reach,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         let (address, memory) = platform.memory().allocate(beats)?;
         let bytes = (memory.beats().len() as u64) * BEAT_BYTES as u64;
         let allocation = Allocation::new(platform, address, bytes, reach)?;
@@ -176,11 +171,7 @@ impl CpuBuffer {
     }
 
     /// Gives the buffer to the device, which will touch its first `used` beats.
-    pub(crate) fn into_device(
-        self,
-        used: usize,
-        access: Access,
-    ) -> Result<DeviceBuffer, PlatformError> {
+    pub(crate) fn into_device(self, used: usize, access: Access) -> Result<DeviceBuffer> {
         let Self { memory, mut allocation } = self;
         allocation.owner = Owner::Device;
         let source = allocation.platform.memory();
@@ -198,13 +189,13 @@ pub(crate) struct DeviceBuffer {
 
 impl DeviceBuffer {
     /// Where `bytes` from `offset` lie for the device.
-    pub(crate) fn range(&self, offset: u64, bytes: u64) -> Result<BusAddress, PlatformError> {
+    pub(crate) fn range(&self, offset: u64, bytes: u64) -> Result<BusAddress> {
         self.allocation.range(offset, bytes)
     }
 
     /// Takes the buffer back. Only for a buffer whose descriptors are all complete, or whose core
     /// was reset.
-    pub(crate) fn into_cpu(self) -> Result<CpuBuffer, PlatformError> {
+    pub(crate) fn into_cpu(self) -> Result<CpuBuffer> {
         let Self { mut allocation } = self;
         acquire_from_device();
         let memory = allocation.platform.memory().take_back(allocation.address)?;
@@ -226,7 +217,7 @@ impl SharedWords {
         platform: &Arc<dyn Platform>,
         words: usize,
         reach: Reach,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         let (address, memory) = platform.memory().allocate_shared(words)?;
         let bytes = (memory.len() as u64) * 4;
         let allocation = Allocation::new(platform, address, bytes, reach)?;
@@ -248,7 +239,7 @@ impl SharedWords {
     }
 
     /// Where `count` words from `index` lie for the device.
-    pub(crate) fn range(&self, index: usize, count: usize) -> Result<BusAddress, PlatformError> {
+    pub(crate) fn range(&self, index: usize, count: usize) -> Result<BusAddress> {
         self.allocation.range(index as u64 * 4, count as u64 * 4)
     }
 

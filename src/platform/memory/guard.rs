@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::platform::{DmaMemorySource, Platform, PlatformError, RegisterMap, RegisterWindow};
+use crate::platform::{DmaMemorySource, Platform, RegisterMap, RegisterWindow, Result};
 
 /// A platform with the guard in place of its memory.
 #[derive(Debug)]
@@ -15,13 +15,13 @@ pub(crate) struct GuardPlatform {
 
 impl GuardPlatform {
     /// The guard of a board; `None` if nothing is reserved behind its fence.
-    pub(crate) fn of(board: &Arc<dyn Platform>) -> Result<Option<Self>, PlatformError> {
+    pub(crate) fn of(board: &Arc<dyn Platform>) -> Result<Option<Self>> {
         Ok(board.guard()?.map(|guard| Self { board: Arc::clone(board), guard }))
     }
 }
 
 impl Platform for GuardPlatform {
-    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+    fn window(&self, map: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
         self.board.window(map)
     }
 
@@ -37,11 +37,11 @@ impl Platform for GuardPlatform {
         self.board.pause(duration);
     }
 
-    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+    fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>> {
         self.board.wait_interrupt(timeout)
     }
 
-    fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+    fn unmask_interrupt(&self) -> Result<()> {
         self.board.unmask_interrupt()
     }
 }
@@ -50,7 +50,9 @@ impl Platform for GuardPlatform {
 mod tests {
     use super::*;
     use crate::platform::uio_fake::{accelerator, add_node};
-    use crate::platform::{HardwarePlatform, ManagerChoice, MemoryChoice, RegisterChoice};
+    use crate::platform::{
+        HardwarePlatform, ManagerChoice, MemoryChoice, PlatformError, RegisterChoice,
+    };
 
     #[test]
     fn the_guard_of_a_real_board_is_a_node_of_its_own_and_never_memory_for_steps() {

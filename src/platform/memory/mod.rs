@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Access, DmaMemory, PlatformError, SharedMemory};
+use super::{Access, DmaMemory, Result, SharedMemory};
 
 pub(crate) mod buffer;
 pub(crate) mod copy;
@@ -35,19 +35,13 @@ pub(crate) trait DmaMemorySource: fmt::Debug + Send + Sync {
         None
     }
     /// Contiguous memory, aligned to 64 bytes on the bus, owned by the CPU.
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError>;
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory)>;
     /// Coherent words that both sides may touch at any time.
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError>;
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory)>;
     /// Gives memory to the device, which will touch its first `used` beats.
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError>;
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()>;
     /// Takes memory back that the device has finished with.
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError>;
+    fn take_back(&self, address: u64) -> Result<DmaMemory>;
     /// Frees memory that the CPU owns, or shared words that no engine runs on.
-    fn release(&self, address: u64) -> Result<(), PlatformError>;
+    fn release(&self, address: u64) -> Result<()>;
 }

@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pgs_interface::record::BEAT_BYTES;
 
-use crate::platform::{Access, DmaMemory, DmaMemorySource, PlatformError, SharedMemory};
+use crate::platform::{Access, DmaMemory, DmaMemorySource, PlatformError, Result, SharedMemory};
 
 /// Bytes of a cache line, the alignment and the unit of a piece.
 const LINE: u64 = 64;
@@ -25,25 +25,13 @@ pub(crate) trait Region: fmt::Debug + Send + Sync {
     fn bytes(&self) -> u64;
     /// The CPU's side of `beats` beats at `at`. The caller is the only holder: the pool cuts pieces
     /// that do not overlap, and gives a piece out again only after its release.
-    fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError>;
+    fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory>;
     /// `words` words at `at` that both sides see at any time.
-    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError>;
+    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory>;
     /// Makes the first `used` beats of `memory` visible to the device.
-    fn to_device(
-        &self,
-        at: usize,
-        memory: &DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError>;
+    fn to_device(&self, at: usize, memory: &DmaMemory, used: usize, access: Access) -> Result<()>;
     /// Makes the first `used` beats that the device wrote visible in `memory`.
-    fn to_cpu(
-        &self,
-        at: usize,
-        memory: &mut DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError>;
+    fn to_cpu(&self, at: usize, memory: &mut DmaMemory, used: usize, access: Access) -> Result<()>;
 }
 
 /// A piece in use.
@@ -83,7 +71,7 @@ impl Pool {
     }
 
     /// Cuts out a piece; returns its address and its offset in the region.
-    fn cut(&self, bytes: u64) -> Result<(u64, usize), PlatformError> {
+    fn cut(&self, bytes: u64) -> Result<(u64, usize)> {
         let mut state = self.state();
         let wanted = bytes.max(1).checked_next_multiple_of(LINE);
         let length = |range: &Range<u64>| range.end - range.start;
@@ -109,7 +97,7 @@ impl Pool {
         Ok((address, self.offset(address)?))
     }
 
-    fn offset(&self, address: u64) -> Result<usize, PlatformError> {
+    fn offset(&self, address: u64) -> Result<usize> {
         address
             .checked_sub(self.region.address())
             .and_then(|offset| usize::try_from(offset).ok())
@@ -117,11 +105,7 @@ impl Pool {
     }
 
     /// Cuts out a piece and makes a value of it; if `make` fails, the piece is free again.
-    fn give<T>(
-        &self,
-        bytes: u64,
-        make: impl FnOnce(usize) -> Result<T, PlatformError>,
-    ) -> Result<(u64, T), PlatformError> {
+    fn give<T>(&self, bytes: u64, make: impl FnOnce(usize) -> Result<T>) -> Result<(u64, T)> {
         let (address, at) = self.cut(bytes)?;
         match make(at) {
             Ok(made) => Ok((address, made)),
@@ -142,36 +126,30 @@ impl DmaMemorySource for Pool {
         Some((self.region.address(), self.region.bytes()))
     }
 
-    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+    fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory)> {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         self.give(bytes, |at| self.region.memory(at, beats))
     }
 
-    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+    fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory)> {
         let bytes = (words as u64).saturating_mul(4);
         self.give(bytes, |at| self.region.shared(at, words))
     }
 
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
-        let at = self.offset(address)?;
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()> {
+        let offset = self.offset(at)?;
         let mut state = self.state();
-        match state.pieces.get_mut(&address) {
+        match state.pieces.get_mut(&at) {
             Some(Piece { handed_over: handed_over @ None, .. }) => {
-                self.region.to_device(at, &memory, used.min(memory.beats().len()), access)?;
+                self.region.to_device(offset, &memory, used.min(memory.beats().len()), access)?;
                 *handed_over = Some((memory, used, access));
                 Ok(())
             }
-            _ => Err(PlatformError::NotGivenOut { address, state: "with the CPU" }),
+            _ => Err(PlatformError::NotGivenOut { address: at, state: "with the CPU" }),
         }
     }
 
-    fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+    fn take_back(&self, address: u64) -> Result<DmaMemory> {
         let at = self.offset(address)?;
         let mut state = self.state();
         let piece = state.pieces.get_mut(&address);
@@ -185,7 +163,7 @@ impl DmaMemorySource for Pool {
     }
 
     /// Refuses a piece with the device, which may still write it.
-    fn release(&self, address: u64) -> Result<(), PlatformError> {
+    fn release(&self, address: u64) -> Result<()> {
         let mut state = self.state();
         match state.pieces.get(&address) {
             Some(Piece { handed_over: None, .. }) => {}
@@ -227,7 +205,7 @@ mod tests {
         (root, Pool::new(Box::new(memory)))
     }
 
-    fn address_of<T>(given: Result<(u64, T), PlatformError>) -> u64 {
+    fn address_of<T>(given: Result<(u64, T)>) -> u64 {
         given.expect("there is room").0
     }
 

@@ -13,7 +13,7 @@ use super::copy::{load_beats, store_beats};
 use super::pool::Region;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::{
-    Access, DmaMemory, PlatformError, SharedMemory, System, UioDevice, acquire_from_device,
+    Access, DmaMemory, PlatformError, Result, SharedMemory, System, UioDevice, acquire_from_device,
     release_to_device,
 };
 
@@ -51,7 +51,7 @@ impl ReservedMemory {
     }
 
     /// Memory that was mapped, at that physical address.
-    pub(crate) fn new(mapping: Mapping, address: u64, name: String) -> Result<Self, PlatformError> {
+    pub(crate) fn new(mapping: Mapping, address: u64, name: String) -> Result<Self> {
         if !address.is_multiple_of(BEAT_BYTES as u64) {
             return Err(PlatformError::Misaligned { region: name, address });
         }
@@ -80,7 +80,7 @@ impl ReservedMemory {
     }
 
     /// For the only holder of these beats.
-    fn store(&self, at: u64, beats: &[Beat]) -> Result<(), PlatformError> {
+    fn store(&self, at: u64, beats: &[Beat]) -> Result<()> {
         let at = self.checked(at, beats.len())?;
         store_beats(&*self.mapping, at, beats);
         release_to_device();
@@ -99,7 +99,7 @@ impl ReservedMemory {
         Ok(())
     }
 
-    fn checked(&self, at: u64, beats: usize) -> Result<usize, PlatformError> {
+    fn checked(&self, at: u64, beats: usize) -> Result<usize> {
         let bytes = (beats as u64).saturating_mul(BEAT_BYTES as u64);
         let inside = at.checked_add(bytes).is_some_and(|end| end <= self.bytes());
         match usize::try_from(at) {
@@ -130,7 +130,7 @@ impl Region for ReservedMemory {
         ReservedMemory::bytes(self)
     }
 
-    fn memory(&self, _: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
+    fn memory(&self, _: usize, beats: usize) -> Result<DmaMemory> {
         let heap = try_zeroed_slice_box(beats).map_err(|()| PlatformError::Memory {
             act: "allocate",
             what: "beats",
@@ -140,30 +140,18 @@ impl Region for ReservedMemory {
         Ok(DmaMemory::Heap(heap))
     }
 
-    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {
+    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory> {
         Ok(SharedMemory::Mapped { mapping: Arc::clone(&self.mapping), at, words })
     }
 
-    fn to_device(
-        &self,
-        at: usize,
-        memory: &DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
+    fn to_device(&self, at: usize, memory: &DmaMemory, used: usize, access: Access) -> Result<()> {
         match access {
             Access::Read => self.store(at as u64, &memory.beats()[..used]),
             Access::Write => Ok(()),
         }
     }
 
-    fn to_cpu(
-        &self,
-        at: usize,
-        memory: &mut DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
+    fn to_cpu(&self, at: usize, memory: &mut DmaMemory, used: usize, access: Access) -> Result<()> {
         match access {
             Access::Read => Ok(()),
             Access::Write => self.read(at as u64, &mut memory.beats_mut()[..used]),

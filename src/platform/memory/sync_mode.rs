@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::platform::linux::sysfs::{read, read_number};
-use crate::platform::{Caching, PlatformError};
+use crate::platform::{Caching, PlatformError, Result};
 
 /// Bits 1:0 of `sync_mode`: cached even with `O_SYNC`.
 const MODE_CACHED: u64 = 0;
@@ -19,12 +19,7 @@ const MODE_ALWAYS: u64 = 4;
 
 /// Makes sure of a mode in which the device file, opened with and without `O_SYNC`, gives the
 /// mappings that `caching` needs.
-pub(crate) fn set_mode(
-    name: &str,
-    buffer: &Path,
-    caching: Caching,
-    coherent: bool,
-) -> Result<(), PlatformError> {
+pub(crate) fn set_mode(name: &str, buffer: &Path, caching: Caching, coherent: bool) -> Result<()> {
     let path = buffer.join("sync_mode");
     let found = read_number(&path)?;
     let (suits, wanted) = match caching {

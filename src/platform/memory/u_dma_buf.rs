@@ -36,7 +36,7 @@ use crate::platform::linux::lock::LockedFile;
 use crate::platform::linux::mapped::Mapping;
 use crate::platform::linux::sysfs::{read_if_present, read_number};
 use crate::platform::linux::system::{open_device, require_bytes};
-use crate::platform::{Access, DmaMemory, PlatformError, SharedMemory, System};
+use crate::platform::{Access, DmaMemory, PlatformError, Result, SharedMemory, System};
 
 /// The number carries 32 bits of length, in multiples of 16.
 const BYTES_MAX: u64 = 0xFFFF_FFF0;
@@ -65,7 +65,7 @@ struct Sync {
 }
 
 impl Sync {
-    fn open(buffer: &Path) -> Result<Self, PlatformError> {
+    fn open(buffer: &Path) -> Result<Self> {
         let open = |name| {
             let path = buffer.join(name);
             match OpenOptions::new().write(true).open(&path) {
@@ -92,7 +92,7 @@ fn synchronise(
     at: usize,
     bytes: usize,
     access: Access,
-) -> Result<(), PlatformError> {
+) -> Result<()> {
     // Eighteen characters, on the stack: a step allocates nothing.
     let mut text = [0; 18];
     write!(&mut text[..], "{:#018x}", command(at, bytes, access))
@@ -107,11 +107,7 @@ impl UDmaBuf {
     }
 
     /// Maps the buffer of that name.
-    pub(crate) fn open(
-        system: &System,
-        name: &str,
-        caching: Caching,
-    ) -> Result<Self, PlatformError> {
+    pub(crate) fn open(system: &System, name: &str, caching: Caching) -> Result<Self> {
         let buffer = directory(system, name)?;
         let address = read_number(&buffer.join("phys_addr"))?;
         let bytes = read_number(&buffer.join("size"))?;
@@ -149,12 +145,12 @@ impl UDmaBuf {
 }
 
 /// Whether the kernel knows that the device sees the CPU's caches.
-fn is_coherent(buffer: &Path) -> Result<bool, PlatformError> {
+fn is_coherent(buffer: &Path) -> Result<bool> {
     Ok(read_if_present(&buffer.join("dma_coherent"))?.is_some_and(|text| text == "1"))
 }
 
 /// The attributes of the buffer of that name.
-pub(crate) fn directory(system: &System, name: &str) -> Result<PathBuf, PlatformError> {
+pub(crate) fn directory(system: &System, name: &str) -> Result<PathBuf> {
     let classes = [&system.u_dma_buf, &system.udmabuf];
     let found = classes.into_iter().map(|class| class.join(name)).find(|path| path.exists());
     found.ok_or_else(|| PlatformError::NoUDmaBuf {
@@ -207,7 +203,7 @@ impl Region for UDmaBuf {
         self.bytes
     }
 
-    fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory, PlatformError> {
+    fn memory(&self, at: usize, beats: usize) -> Result<DmaMemory> {
         let mapping = Arc::clone(&self.data);
         // SAFETY: `set_mode` made sure that the mapping is normal memory. The device file is locked
         // as long as the mapping exists (`LockedFile`, held by both mappings): no other pool, of
@@ -219,7 +215,7 @@ impl Region for UDmaBuf {
         Ok(DmaMemory::Mapped(memory))
     }
 
-    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory, PlatformError> {
+    fn shared(&self, at: usize, words: usize) -> Result<SharedMemory> {
         if let Some(sync) = &self.sync {
             // No dirty line of an earlier use may be written back over the words.
             synchronise(&sync.for_device, at, 4 * words, Access::Read)?;
@@ -228,26 +224,14 @@ impl Region for UDmaBuf {
         Ok(SharedMemory::Mapped { mapping: Arc::clone(&self.words), at, words })
     }
 
-    fn to_device(
-        &self,
-        at: usize,
-        _: &DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
+    fn to_device(&self, at: usize, _: &DmaMemory, used: usize, access: Access) -> Result<()> {
         match &self.sync {
             Some(sync) if used > 0 => synchronise(&sync.for_device, at, used * BEAT_BYTES, access),
             _ => Ok(()),
         }
     }
 
-    fn to_cpu(
-        &self,
-        at: usize,
-        _: &mut DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<(), PlatformError> {
+    fn to_cpu(&self, at: usize, _: &mut DmaMemory, used: usize, access: Access) -> Result<()> {
         match &self.sync {
             Some(sync) if used > 0 => synchronise(&sync.for_cpu, at, used * BEAT_BYTES, access),
             _ => Ok(()),

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::access_log::{AccessKind, AccessLog, RegisterAccess};
 use super::map::{Decoded, RegisterMap};
-use crate::platform::{Platform, PlatformError};
+use crate::platform::{Platform, PlatformError, Result};
 
 /// One register region of a board: aligned 32-bit accesses inside `bytes`.
 pub(crate) trait RegisterWindow: fmt::Debug + Send + Sync {
@@ -57,7 +57,7 @@ impl Window {
         registers: Box<dyn RegisterWindow>,
         map: RegisterMap,
         counts: Arc<AccessCounts>,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         if registers.bytes() < u64::from(map.bytes()) {
             return Err(PlatformError::ShortRegion {
                 region: map.to_string(),
@@ -73,7 +73,7 @@ impl Window {
         platform: &dyn Platform,
         map: RegisterMap,
         counts: &Arc<AccessCounts>,
-    ) -> Result<Self, PlatformError> {
+    ) -> Result<Self> {
         Self::new(platform.window(map)?, map, Arc::clone(counts))
     }
 
@@ -183,40 +183,34 @@ pub(crate) mod fake {
             "fake"
         }
 
-        fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory), PlatformError> {
+        fn allocate(&self, beats: usize) -> Result<(u64, DmaMemory)> {
             let memory = DmaMemory::Heap(vec![Default::default(); beats].into());
             Ok((self.address(beats * 16), memory))
         }
 
-        fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory), PlatformError> {
+        fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory)> {
             let memory = (0..words).map(|_| AtomicU32::new(0)).collect();
             Ok((self.address(words * 4), SharedMemory::Heap(memory)))
         }
 
-        fn hand_over(
-            &self,
-            at: u64,
-            memory: DmaMemory,
-            _: usize,
-            _: Access,
-        ) -> Result<(), PlatformError> {
+        fn hand_over(&self, at: u64, memory: DmaMemory, _: usize, _: Access) -> Result<()> {
             self.device.lock().expect("no test panics with the lock").insert(at, memory);
             Ok(())
         }
 
-        fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
+        fn take_back(&self, address: u64) -> Result<DmaMemory> {
             let mut device = self.device.lock().expect("no test panics with the lock");
             Ok(device.remove(&address).expect("handed over before"))
         }
 
-        fn release(&self, address: u64) -> Result<(), PlatformError> {
+        fn release(&self, address: u64) -> Result<()> {
             self.released.lock().expect("no test panics with the lock").push(address);
             Ok(())
         }
     }
 
     impl Platform for FakePlatform {
-        fn window(&self, _: RegisterMap) -> Result<Box<dyn RegisterWindow>, PlatformError> {
+        fn window(&self, _: RegisterMap) -> Result<Box<dyn RegisterWindow>> {
             Ok(Box::new(FakeRegisters::default()))
         }
 
@@ -232,12 +226,12 @@ pub(crate) mod fake {
             *self.time.lock().expect("no test panics with the lock") += duration;
         }
 
-        fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>, PlatformError> {
+        fn wait_interrupt(&self, timeout: Duration) -> Result<Option<u32>> {
             self.pause(timeout);
             Ok(None)
         }
 
-        fn unmask_interrupt(&self) -> Result<(), PlatformError> {
+        fn unmask_interrupt(&self) -> Result<()> {
             Ok(())
         }
     }

@@ -6,7 +6,6 @@
 //!
 //! ```sh
 //! cargo bench --bench speed      # the emulated board beside a solver on the CPU
-//! cargo bench --bench order      # ordering beside packing
 //! cargo bench --bench pack       # packing beside memcpy; with --threads 2 beside one thread, too
 //! ```
 

@@ -57,6 +57,9 @@ pub enum Cause {
     Output,
 }
 
+/// The outcome of a command, or of a part of it.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
 /// The failure of a command.
 #[derive(Debug)]
 pub struct Failure {

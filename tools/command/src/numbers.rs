@@ -45,20 +45,6 @@ impl Bound {
             (true, Self::AtMost) => format!("at most {count}"),
         }
     }
-
-    /// Writes the same in few characters.
-    pub fn cell(self, saturated: bool, count: u64) -> String {
-        if saturated { self.short(count as f64) } else { grouped(count) }
-    }
-
-    /// Writes a bound in three digits, rounded so that it stays true.
-    pub fn short(self, bound: f64) -> String {
-        let unit = 10_f64.powf(bound.max(1.0).log10().floor() - 2.0);
-        match self {
-            Self::AtLeast => format!(">={:.2e}", (bound / unit).floor() * unit),
-            Self::AtMost => format!("<={:.2e}", (bound / unit).ceil() * unit),
-        }
-    }
 }
 
 /// Writes a number with its sign.
@@ -79,16 +65,11 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_rounded_to_the_side_on_which_they_are_true() {
+    fn a_bound_is_told_in_words() {
         let most = u64::from(u32::MAX);
         assert_eq!(Bound::AtLeast.words(true, most), "at least 4,294,967,295");
         assert_eq!(Bound::AtMost.words(true, 7), "at most 7");
         assert_eq!(Bound::AtMost.words(false, 1234), "1,234");
-        assert_eq!(Bound::AtLeast.cell(true, most), ">=4.29e9");
-        assert_eq!(Bound::AtMost.cell(true, most), "<=4.30e9");
-        assert_eq!(Bound::AtMost.cell(true, 0), "<=0.00e0");
-        assert_eq!(Bound::AtLeast.cell(false, 1234), "1,234");
-        assert_eq!(Bound::AtLeast.short(17_592_186_044_416.0), ">=1.75e13");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use zynq_pgs::order::Order;
 
 use crate::board::{self, OpenBoard};
 use crate::common::CommonArgs;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::options::ordering::is_sequential;
 use crate::options::scenes;
 
@@ -17,7 +17,7 @@ use crate::options::scenes;
 /// # Errors
 ///
 /// Fails where the grid has too many bodies.
-pub fn build(grid: Grid, drop: f32) -> Result<Scene, Failure> {
+pub fn build(grid: Grid, drop: f32) -> Result<Scene> {
     scenes::check_rows(grid)?;
     Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).map_err(Failure::input)
 }
@@ -32,7 +32,7 @@ pub fn open(
     drop: f32,
     common: &CommonArgs,
     build: &Build,
-) -> Result<(Scene, OpenBoard), Failure> {
+) -> Result<(Scene, OpenBoard)> {
     scenes::check_rows(grid)?;
     let mut opened = board::open(common, build)?.stated();
     scenes::check_size(grid, opened.accelerator.capabilities())?;
@@ -56,7 +56,7 @@ pub fn step_to(
     parameters: &StepParameters,
     steps: u32,
     mut go_on: impl FnMut() -> bool,
-) -> Result<bool, Failure> {
+) -> Result<bool> {
     let parameters = match is_sequential(opened.accelerator.capabilities()) {
         true => parameters.with_order(Some(Order::AsGiven)),
         false => *parameters,

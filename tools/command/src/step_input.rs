@@ -7,7 +7,7 @@ use zynq_pgs::validate::{Excess, InputItem, OutOfRange};
 use zynq_pgs::{Accelerator, InputError, Shape};
 
 use crate::board::OpenBoard;
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use step_folder::folder::{
     BODY_ANGULAR, BODY_INVERSE_INERTIA, BODY_INVERSE_MASS, BODY_LINEAR, BODY_ORIENTATION,
     BODY_POSITION, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS, Folder,
@@ -19,7 +19,7 @@ use step_folder::folder::{
 /// # Errors
 ///
 /// Fails where an array is missing or has another shape.
-pub fn load(path: &Path) -> Result<Folder, Failure> {
+pub fn load(path: &Path) -> Result<Folder> {
     Folder::load(path).map_err(|error| {
         Failure::input(error).next("`pgs solve --help` lists the arrays of a folder")
     })

@@ -13,7 +13,7 @@ use zynq_pgs::StepReport;
 use zynq_pgs::board::BoardKind;
 
 use pgs_command::board::OpenBoard;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::build::described;
 use pgs_command::output::files::{Named, check_folder, unwritten};
 
@@ -71,7 +71,7 @@ impl TracedArgs {
 
     /// The board to record, if a step is to be recorded. A board outside this process has no
     /// recorder.
-    pub(crate) fn tracing(&self, opened: &OpenBoard) -> Result<Option<Tracing<'_>>, Failure> {
+    pub(crate) fn tracing(&self, opened: &OpenBoard) -> Result<Option<Tracing<'_>>> {
         let Some((name, _)) = self.given().next() else { return Ok(None) };
         self.given().try_for_each(|(_, path)| check_folder(path))?;
         if let Some(board) = &opened.observer {
@@ -121,7 +121,7 @@ impl Tracing<'_> {
 
     /// Ends the recording and writes the files; all of them, or none. A step that failed or was
     /// interrupted has no report.
-    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<TraceFiles, Failure> {
+    pub(crate) fn end(&self, report: Option<&StepReport>) -> Result<TraceFiles> {
         match self.board.take_recording().filter(|recording| recording.span.clocks() > 0) {
             Some(recording) => self.write(&recording, report).map(|()| TraceFiles::Written),
             None => {
@@ -131,7 +131,7 @@ impl Tracing<'_> {
         }
     }
 
-    fn write(&self, recording: &Recording, report: Option<&StepReport>) -> Result<(), Failure> {
+    fn write(&self, recording: &Recording, report: Option<&StepReport>) -> Result<()> {
         let design = described(&self.board.config());
         let step = TracedStep { recording, design: &design, report };
         let mut files = Replacement::default();

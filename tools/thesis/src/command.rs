@@ -4,7 +4,7 @@ use std::io::Write;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs, Given};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use serde_json::json;
 
 use crate::experiment::{Boards, Experiment, SCHEMA};
@@ -111,7 +111,7 @@ impl ThesisArgs {
     /// # Errors
     ///
     /// Fails as the experiment does, or where `out` or a file takes no more.
-    pub fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
+    pub fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
         match &self.one {
             None if self.all.is_asked() => report::run(&self.all, common, out),
             None => list(common, out),
@@ -139,11 +139,7 @@ impl ThesisArgs {
     }
 
     /// Runs one experiment within a session.
-    pub(crate) fn run_one(
-        &self,
-        session: &Session,
-        out: &mut dyn Write,
-    ) -> Result<Verdict, Failure> {
+    pub(crate) fn run_one(&self, session: &Session, out: &mut dyn Write) -> Result<Verdict> {
         let named = self.one.as_ref().and_then(|(name, options)| {
             let experiment = experiments().into_iter().find(|each| each.id == name)?;
             Some((experiment, options))
@@ -165,7 +161,7 @@ impl ThesisArgs {
 }
 
 /// Writes the list of experiments.
-fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
+fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     let columns = [("name", "name"), ("thesis", "thesis"), ("about", "")];
     let mut table = Table::with_columns("experiments", "Experiments", &columns);
     for experiment in experiments() {

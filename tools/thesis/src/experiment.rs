@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use clap::{ArgMatches, Command, FromArgMatches};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::facts::fact;
 use pgs_command::output::width::stdout_width;
 use serde::Serialize;
@@ -44,11 +44,11 @@ pub(crate) struct Experiment {
     /// Adds its arguments and its help.
     pub(crate) arguments: fn(Command) -> Command,
     /// Measures or computes; the matches are of its arguments.
-    pub(crate) run: fn(&ArgMatches, &Session) -> Result<Part, Failure>,
+    pub(crate) run: fn(&ArgMatches, &Session) -> Result<Part>,
 }
 
 /// The arguments of an experiment.
-pub(crate) fn given<A: FromArgMatches>(matches: &ArgMatches) -> Result<A, Failure> {
+pub(crate) fn given<A: FromArgMatches>(matches: &ArgMatches) -> Result<A> {
     A::from_arg_matches(matches).map_err(Failure::input)
 }
 
@@ -158,7 +158,7 @@ impl Part {
     }
 
     /// For people.
-    pub(crate) fn write_text(&self, out: &mut dyn Write) -> Result<(), Failure> {
+    pub(crate) fn write_text(&self, out: &mut dyn Write) -> Result<()> {
         for (label, text) in &self.facts {
             fact(out, label, text)?;
         }
@@ -176,7 +176,7 @@ impl Part {
         &self,
         experiment: &Experiment,
         out: &mut dyn Write,
-    ) -> Result<(), Failure> {
+    ) -> Result<()> {
         writeln!(out, "## {}: {}\n", experiment.thesis, experiment.id)?;
         for (_, text) in &self.facts {
             writeln!(out, "{text}\n")?;

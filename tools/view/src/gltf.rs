@@ -14,7 +14,6 @@ use scene::GROUND_HALF_EXTENT;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::base64;
 use crate::error::{TooLarge, ViewError};
 use crate::kinds::{COLOURS, surfaces};
 use crate::mesh::Mesh;
@@ -105,23 +104,13 @@ struct Document {
     meshes: Vec<Value>,
 }
 
-/// The recording as one file of JSON, its buffer inside as base64.
-///
-/// # Errors
-/// [`ViewError`]: the buffer has 4 GiB or more, or a geometry has no surface.
-pub fn text(recording: &Recording) -> Result<String, ViewError> {
-    let (document, buffer) = document(recording)?;
-    let uri = format!("data:application/octet-stream;base64,{}", base64::encode(&buffer));
-    document.json(buffer.len(), Some(uri))
-}
-
 /// The recording as a binary file (GLB).
 ///
 /// # Errors
 /// [`ViewError`]: the file has 4 GiB or more, or a geometry has no surface.
 pub fn binary(recording: &Recording) -> Result<Vec<u8>, ViewError> {
     let (document, mut buffer) = document(recording)?;
-    let mut text = document.json(buffer.len(), None)?.into_bytes();
+    let mut text = document.json(buffer.len())?.into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     buffer.resize(buffer.len().next_multiple_of(4), 0);
     // A header of three words; in front of each chunk two.
@@ -321,7 +310,7 @@ impl Document {
 
 impl Parts {
     /// The text of the document; `uri` is where the buffer is, unless it follows in the same file.
-    fn json(&self, buffer_bytes: usize, uri: Option<String>) -> Result<String, ViewError> {
+    fn json(&self, buffer_bytes: usize) -> Result<String, ViewError> {
         #[derive(Serialize)]
         #[serde(rename_all = "camelCase")]
         struct Root<'a> {
@@ -344,10 +333,7 @@ impl Parts {
             channels: &'a [Channel],
         }
         let Self { views, accessors, meshes, nodes, samplers, channels } = self;
-        let mut buffer = json!({ "byteLength": buffer_bytes });
-        if let Some(uri) = uri {
-            buffer["uri"] = uri.into();
-        }
+        let buffer = json!({ "byteLength": buffer_bytes });
         let colours = [GROUND_COLOUR].into_iter().chain(COLOURS.map(linear));
         let material = |colour: [f32; 4]| {
             json!({ "pbrMetallicRoughness": {

@@ -7,9 +7,9 @@ use super::instructions::Instructions;
 
 /// NEON.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Neon;
+pub(super) struct Neon<const BINARY16: bool>;
 
-impl Neon {
+impl<const BINARY16: bool> Neon<BINARY16> {
     #[inline(always)]
     fn selected(mask: uint32x4_t, a: float32x4_t, b: float32x4_t) -> float32x4_t {
         // SAFETY: every processor of the target has NEON.
@@ -34,18 +34,10 @@ macro_rules! by_instructions {
     )*};
 }
 
-impl Instructions for Neon {
+impl<const BINARY16: bool> Instructions for Neon<BINARY16> {
+    const BINARY16: bool = BINARY16;
+
     type Register = float32x4_t;
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
 
     by_instructions! {
         add(a, b) vaddq_f32;

@@ -23,14 +23,23 @@ pub trait Work {
 
 /// Proof that the processor has a set of instructions, and the operations by them.
 pub trait Instructions: Copy + Debug {
+    /// Whether [`F32s`](super::F32s) rounds all results of arithmetic to binary16.
+    const BINARY16: bool;
+
     /// A number in each lane.
-    type Register: Copy;
+    type Register: bytemuck::Pod;
 
     /// The numbers of an array.
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register;
+    #[inline(always)]
+    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
+        bytemuck::cast(*numbers)
+    }
 
     /// The array of the numbers.
-    fn store(self, numbers: Self::Register) -> [f32; LANES];
+    #[inline(always)]
+    fn store(self, numbers: Self::Register) -> [f32; LANES] {
+        bytemuck::cast(numbers)
+    }
 
     /// The same number in each lane.
     #[inline(always)]
@@ -61,6 +70,12 @@ pub trait Instructions: Copy + Debug {
         let (a, b) = (self.store(a), self.store(b));
         let bits = each(|lane| u32::from(condition(a[lane], b[lane])) << lane);
         bits.into_iter().fold(0, |all, bit| all | bit)
+    }
+
+    /// The results of arithmetic as they are kept. A NaN is one of any bits.
+    #[inline(always)]
+    fn rounded(self, a: Self::Register) -> Self::Register {
+        if Self::BINARY16 { self.zip(a, a, |a, _| nearest_binary16(a)) } else { a }
     }
 
     /// `a + b`.
@@ -212,23 +227,33 @@ pub trait Instructions: Copy + Debug {
     }
 }
 
+/// The number of binary16 nearest to a number; a tie goes to the even one. It has no branch, so that
+/// the compiler vectorises it.
+#[inline(always)]
+fn nearest_binary16(value: f32) -> f32 {
+    const EXPONENT: u32 = 0x7F80_0000;
+    /// 2^-14, the smallest normal number.
+    const SMALLEST_NORMAL: u32 = 0x3880_0000;
+    /// Half a step beyond the largest number.
+    const TOO_LARGE: f32 = 65_520.0;
+    let magnitude = value.abs();
+    let binade = (magnitude.to_bits() & EXPONENT).max(SMALLEST_NORMAL);
+    // A power of two at which the steps of f32 are those of binary16 at the number.
+    let large = f32::from_bits(binade.wrapping_add(13 << 23));
+    let near = (magnitude + large) - large;
+    let near = if magnitude >= TOO_LARGE { f32::INFINITY } else { near };
+    near.copysign(value)
+}
+
 /// The instructions that every processor of the target has, as the compiler finds them.
 #[cfg_attr(target_arch = "aarch64", allow(dead_code, reason = "all of them have NEON"))]
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Target;
+pub(super) struct Target<const BINARY16: bool>;
 
-impl Instructions for Target {
+impl<const BINARY16: bool> Instructions for Target<BINARY16> {
+    const BINARY16: bool = BINARY16;
+
     type Register = [f32; LANES];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> [f32; LANES] {
-        *numbers
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: [f32; LANES]) -> [f32; LANES] {
-        numbers
-    }
 }
 
 /// Prefetches a value into the cache, on processors with such an instruction. The address may be

@@ -2,7 +2,8 @@
 //! x86-64, four on aarch64, where a register holds no more and sixteen would be spilled.
 //!
 //! Each lane has the bits of the same operation on one f32: one rounding, subnormals kept, nothing
-//! contracted. [`Instructions`] writes every operation lane by lane; a set of instructions
+//! contracted. A set that rounds to binary16 rounds once more: of binary16 numbers that is the
+//! binary16 operation. [`Instructions`] writes every operation lane by lane; a set of instructions
 //! overrides the operations for which it has one.
 //!
 //! ```text
@@ -55,7 +56,7 @@ impl<I: Instructions> F32s<I> {
     #[inline(always)]
     #[must_use]
     pub fn splat(instructions: I, number: f32) -> Self {
-        Self(instructions.splat(number), instructions)
+        Self(instructions.rounded(instructions.splat(number)), instructions)
     }
 
     /// The same number in each lane, for the same instructions.
@@ -121,7 +122,7 @@ impl<I: Instructions> F32s<I> {
     #[inline(always)]
     #[must_use]
     pub fn sqrt(self) -> Self {
-        Self(self.1.sqrt(self.0), self.1)
+        Self(self.1.rounded(self.1.sqrt(self.0)), self.1)
     }
 
     /// The absolute value.
@@ -174,7 +175,7 @@ macro_rules! operators {
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self(self.1.$method(self.0, other.0), self.1)
+                Self(self.1.rounded(self.1.$method(self.0, other.0)), self.1)
             }
         }
     )*};

@@ -84,6 +84,39 @@ fn every_lane_computes_what_a_number_alone_does() {
     }
 }
 
+/// Tests roundings of all f32 whose low mantissa bits decide them, in every binade.
+struct Roundings;
+
+impl Work for Roundings {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, instructions: impl Instructions) {
+        const TAILS: [u32; 8] = [0, 1, 0xFFF, 0x1000, 0x1001, 0x1FFF, 0x0800, 0x1800];
+        let (zero, one) = (F32s::splat(instructions, -0.0), F32s::splat(instructions, 1.0));
+        for high in 0..1_u32 << 19 {
+            let numbers = each(|lane| f32::from_bits((high << 13) | TAILS[lane % TAILS.len()]));
+            let expected = numbers.map(|number| bits(half::f16::from_f32(number).to_f32()));
+            let same = F32s::from_array(instructions, &numbers);
+            for kept in [same + zero, same - -zero, same * one, same / one] {
+                assert_eq!(kept.to_array().map(bits), expected, "{instructions:?}: {numbers:?}");
+            }
+            let root = numbers.map(|number| bits(half::f16::from_f32(number.sqrt()).to_f32()));
+            assert_eq!(same.sqrt().to_array().map(bits), root, "{instructions:?}: {numbers:?}");
+        }
+        let third = F32s::splat(instructions, 1.0 / 3.0).to_array().map(bits);
+        let expected = bits(half::f16::from_f32(1.0 / 3.0).to_f32());
+        assert_eq!(third, [expected; LANES], "{instructions:?}");
+    }
+}
+
+#[test]
+fn results_of_arithmetic_are_rounded_to_binary16_if_asked_for() {
+    for set in InstructionSet::all() {
+        set.in_binary16(true).run(Roundings);
+    }
+}
+
 struct Selections;
 
 #[expect(clippy::float_cmp, reason = "the numbers are only moved")]

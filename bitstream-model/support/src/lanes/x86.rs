@@ -7,7 +7,7 @@ use super::{LANES, each};
 
 /// Operations of registers that hold all lanes in some parts, by an instruction each.
 macro_rules! by_instructions {
-    ($($method:ident($first:ident $(, $other:ident)*) $instruction:ident;)*) => {$(
+    ($($method:ident($first:ident $(, $other:ident)*) $instruction:path;)*) => {$(
         #[inline(always)]
         fn $method(self, $first: Self::Register $(, $other: Self::Register)*) -> Self::Register {
             let mut result = $first;
@@ -28,13 +28,21 @@ macro_rules! set {
     ) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy)]
-        pub(super) struct $name(());
+        pub(super) struct $name<const BINARY16: bool>(());
 
-        impl $name {
+        impl $name<false> {
             /// If the processor has it.
             pub(super) fn found() -> Option<Self> {
                 [$(is_x86_feature_detected!($feature)),*].iter().all(|has| *has).then_some(Self(()))
             }
+
+            /// The same instructions, rounding to binary16.
+            pub(super) fn in_binary16(self) -> $name<true> {
+                $name(())
+            }
+        }
+
+        impl<const BINARY16: bool> $name<BINARY16> {
 
             #[inline]
             pub(super) fn run<W: Work>(self, work: W) -> W::Output {
@@ -52,7 +60,7 @@ macro_rules! set {
 
 set! {
     /// A register holds eight lanes.
-    Avx2: __m256, "avx2", "avx2"
+    Avx2: __m256, "avx2,f16c", "avx2" "f16c"
 }
 
 set! {
@@ -61,7 +69,7 @@ set! {
     Avx512: __m512, "avx512f,avx512bw,avx512dq,avx512vl", "avx512f" "avx512bw" "avx512dq" "avx512vl"
 }
 
-impl Avx2 {
+impl<const BINARY16: bool> Avx2<BINARY16> {
     #[inline]
     #[target_feature(enable = "avx2")]
     fn four([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
@@ -93,6 +101,15 @@ impl Avx2 {
     }
 
     #[inline]
+    #[target_feature(enable = "avx2,f16c")]
+    fn kept(a: __m256) -> __m256 {
+        match BINARY16 {
+            true => _mm256_cvtph_ps(_mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(a)),
+            false => a,
+        }
+    }
+
+    #[inline]
     #[target_feature(enable = "avx2")]
     fn bits<const COMPARISON: i32>(a: [__m256; 2], b: [__m256; 2]) -> u32 {
         let of = |part: usize| {
@@ -114,18 +131,10 @@ impl Avx2 {
     }
 }
 
-impl Instructions for Avx2 {
+impl<const BINARY16: bool> Instructions for Avx2<BINARY16> {
+    const BINARY16: bool = BINARY16;
+
     type Register = [__m256; 2];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
 
     by_instructions! {
         add(a, b) _mm256_add_ps;
@@ -135,6 +144,7 @@ impl Instructions for Avx2 {
         larger(a, b) _mm256_max_ps;
         smaller(a, b) _mm256_min_ps;
         sqrt(a) _mm256_sqrt_ps;
+        rounded(a) Self::kept;
     }
 
     #[inline(always)]
@@ -200,7 +210,7 @@ impl Instructions for Avx2 {
     }
 }
 
-impl Avx512 {
+impl<const BINARY16: bool> Avx512<BINARY16> {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn four([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
@@ -285,6 +295,15 @@ impl Avx512 {
 
     #[inline]
     #[target_feature(enable = "avx512f")]
+    fn kept(a: __m512) -> __m512 {
+        match BINARY16 {
+            true => _mm512_cvtph_ps(_mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(a)),
+            false => a,
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
     fn selected(bits: u32, a: __m512, b: __m512) -> __m512 {
         #[allow(clippy::cast_possible_truncation, reason = "there are sixteen lanes")]
         let mask = bits as __mmask16;
@@ -298,18 +317,10 @@ impl Avx512 {
     }
 }
 
-impl Instructions for Avx512 {
+impl<const BINARY16: bool> Instructions for Avx512<BINARY16> {
+    const BINARY16: bool = BINARY16;
+
     type Register = [__m512; 1];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
 
     by_instructions! {
         add(a, b) _mm512_add_ps;
@@ -320,6 +331,7 @@ impl Instructions for Avx512 {
         smaller(a, b) _mm512_min_ps;
         sqrt(a) _mm512_sqrt_ps;
         abs(a) _mm512_abs_ps;
+        rounded(a) Self::kept;
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use bitstream_model::{BoardConfig, EmulatedBoard};
 
 use super::not_built;
 use crate::common::AcceleratorChoice;
-use crate::failure::{Cause, Failure};
+use crate::failure::{Cause, Failure, Result};
 
 /// Starts the accelerator that was chosen for a board that is built as `config` says; none for the
 /// built-in model.
@@ -17,7 +17,7 @@ use crate::failure::{Cause, Failure};
 pub fn external_accelerator(
     config: &mut BoardConfig,
     accelerator: &AcceleratorChoice,
-) -> Result<Option<Box<dyn ExternalAccelerator>>, Failure> {
+) -> Result<Option<Box<dyn ExternalAccelerator>>> {
     let Some((path, with_model)) = accelerator.simulator() else { return Ok(None) };
     let simulator = SimulatorProcess::start_for(config, path).map_err(|error| {
         let next = match error {
@@ -50,7 +50,7 @@ pub fn external_accelerator(
 pub fn emulated_board(
     mut config: BoardConfig,
     accelerator: &AcceleratorChoice,
-) -> Result<EmulatedBoard, Failure> {
+) -> Result<EmulatedBoard> {
     match external_accelerator(&mut config, accelerator)? {
         Some(external) => EmulatedBoard::with_accelerator(config, external),
         None => EmulatedBoard::new(config),

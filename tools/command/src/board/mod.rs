@@ -22,7 +22,7 @@ pub use self::accelerator::{emulated_board, external_accelerator};
 use crate::common::{BoardName, CommonArgs};
 use crate::diagnosis;
 use crate::environment::MEMORY;
-use crate::failure::{Cause, Failure};
+use crate::failure::{Cause, Failure, Result};
 use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
 use crate::options::build::{board_option, described};
 use crate::options::planned::{Injected, PlannedArgs};
@@ -94,7 +94,7 @@ fn find_kind(system: &System) -> (BoardKind, String) {
 /// # Errors
 ///
 /// Fails where there is no real board and none was named.
-pub fn require(common: &CommonArgs) -> Result<(), Failure> {
+pub fn require(common: &CommonArgs) -> Result<()> {
     let (kind, reason) = choose(&common.board, &System::default());
     if kind != BoardKind::Emulated || common.board != BoardName::Auto {
         return Ok(());
@@ -127,7 +127,7 @@ pub fn find(
     common: &CommonArgs,
     config: BoardConfig,
     given: Option<String>,
-) -> Result<ChosenBoard, Failure> {
+) -> Result<ChosenBoard> {
     let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
     let (kind, reason) = choose(name, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
@@ -200,7 +200,7 @@ pub fn not_built(error: ConfigError) -> Failure {
 /// # Errors
 ///
 /// Fails where there is no such board, or it cannot be opened.
-pub fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard, Failure> {
+pub fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard> {
     open_as(common, build, build.config())
 }
 
@@ -210,11 +210,7 @@ pub fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard, Failure> {
 /// # Errors
 ///
 /// Fails where there is no such board, or it cannot be opened.
-pub fn open_as(
-    common: &CommonArgs,
-    build: &Build,
-    config: BoardConfig,
-) -> Result<OpenBoard, Failure> {
+pub fn open_as(common: &CommonArgs, build: &Build, config: BoardConfig) -> Result<OpenBoard> {
     let ChosenBoard { options, observer, reason, .. } = find(common, config, board_option(build))?;
     let accelerator = Accelerator::open(options)
         .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
@@ -305,7 +301,7 @@ impl OpenBoard {
     /// # Errors
     ///
     /// Fails where it has died or does not answer as the model.
-    pub fn alive(&self) -> Result<(), Failure> {
+    pub fn alive(&self) -> Result<()> {
         dead(self.observer.as_ref()).map_or(Ok(()), Err)
     }
 
@@ -314,11 +310,7 @@ impl OpenBoard {
     /// # Errors
     ///
     /// Fails where the board is not an emulated one of this process.
-    pub fn inject(
-        &mut self,
-        planned: &PlannedArgs,
-        parameters: &StepParameters,
-    ) -> Result<(), Failure> {
+    pub fn inject(&mut self, planned: &PlannedArgs, parameters: &StepParameters) -> Result<()> {
         if !planned.is_given() {
             return Ok(());
         }

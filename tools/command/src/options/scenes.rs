@@ -11,7 +11,7 @@ use step_folder::npy;
 use zynq_pgs::Capabilities;
 use zynq_pgs::emulation::Build;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Result};
 use crate::numbers::grouped;
 
 /// A contact of a scene that has moved further than this from one step to the next is a new one, m.
@@ -84,7 +84,7 @@ fn drop_height(text: &str) -> Result<f32, String> {
 /// # Errors
 ///
 /// Fails where the grid has too many bodies.
-pub fn check_rows(grid: Grid) -> Result<(), Failure> {
+pub fn check_rows(grid: Grid) -> Result<()> {
     let bodies = u64::from(grid.cubes()) + 1;
     if bodies <= npy::ROWS_MAX as u64 {
         return check_memory(grid);
@@ -101,7 +101,7 @@ pub fn check_rows(grid: Grid) -> Result<(), Failure> {
 /// # Errors
 ///
 /// Fails where the grid has too many bodies for the board.
-pub fn check_size(grid: Grid, capabilities: &Capabilities) -> Result<(), Failure> {
+pub fn check_size(grid: Grid, capabilities: &Capabilities) -> Result<()> {
     let capacity = capabilities.body_capacity;
     if grid.cubes() < capacity {
         return check_memory(grid);
@@ -118,7 +118,7 @@ const BODY_BYTES: usize = 2560;
 
 /// Refuses a grid that the system has no memory for. The program would abort at some later
 /// allocation.
-fn check_memory(grid: Grid) -> Result<(), Failure> {
+fn check_memory(grid: Grid) -> Result<()> {
     let bytes = BODY_BYTES * grid.cubes() as usize;
     let mut room = Vec::<u8>::new();
     let reserved = room.try_reserve_exact(bytes);
@@ -136,7 +136,7 @@ impl SceneArgs {
     /// # Errors
     ///
     /// Fails on options of another scene, and where the bodies reach too far.
-    pub fn build(&self, board: &Build) -> Result<Scene, Failure> {
+    pub fn build(&self, board: &Build) -> Result<Scene> {
         let (grid, drop) = (self.grid(), self.drop);
         let built = match self.scene {
             SceneName::Cubes if self.seed.is_some() => {
@@ -181,7 +181,7 @@ impl SceneArgs {
     /// # Errors
     ///
     /// Fails where the grid has too many bodies for the board.
-    pub fn check_size(&self, capabilities: &Capabilities) -> Result<(), Failure> {
+    pub fn check_size(&self, capabilities: &Capabilities) -> Result<()> {
         check_size(self.grid(), capabilities)
     }
 
@@ -190,7 +190,7 @@ impl SceneArgs {
     /// # Errors
     ///
     /// Fails on cubes, which have one friction.
-    pub fn give_frictions(&self, scene: &mut Scene) -> Result<(), Failure> {
+    pub fn give_frictions(&self, scene: &mut Scene) -> Result<()> {
         if self.is_cubes() {
             let error = "--pair-friction is for --scene shapes, the cubes have one friction";
             return Err(Failure::input(error));

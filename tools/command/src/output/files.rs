@@ -10,7 +10,7 @@ use step_folder::replace::ReplaceError;
 use thiserror::Error;
 
 use crate::common::CommonArgs;
-use crate::failure::{Cause, Failure};
+use crate::failure::{Cause, Failure, Result};
 
 /// The folder of a file is missing.
 #[derive(Debug, Error)]
@@ -25,7 +25,7 @@ struct NoFolder {
 /// # Errors
 ///
 /// Fails where its folder is missing.
-pub fn check_folder(path: &Path) -> Result<(), Failure> {
+pub fn check_folder(path: &Path) -> Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     match folder.filter(|folder| !folder.is_dir()) {
         None => Ok(()),
@@ -115,7 +115,7 @@ impl Files {
     /// # Errors
     ///
     /// Fails where two of the files are one.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub fn check(&self) -> Result<()> {
         let streams = [("standard output", "/dev/stdout"), ("standard error", "/dev/stderr")];
         let streams = streams.map(|(name, path)| Named::role(name, path));
         for (at, output) in self.outputs.iter().enumerate() {

@@ -13,7 +13,7 @@ use zynq_pgs::{CheckReport, check};
 
 use pgs_command::board::{self, ChosenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Result, Verdict};
 use pgs_command::options::build::{BuildArgs, board_option};
 use pgs_command::output::SCHEMA;
 use pgs_command::output::facts::labelled;
@@ -116,11 +116,7 @@ impl CheckArgs {
 }
 
 /// Tests the board.
-pub(crate) fn run(
-    args: &CheckArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &CheckArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     board::require(common)?;
     let ChosenBoard { kind, options, reason, .. } =
         board::find(common, args.config(), args.board_option())?;

@@ -9,7 +9,7 @@ use pgs_loading::{AtFault, Chip, Judged, Linux, LoadError, Progress, Request};
 use serde_json::{Value, json};
 
 use pgs_command::common::{CommonArgs, ManagerOptions};
-use pgs_command::failure::{Cause, Failure, INTERRUPTED, Verdict};
+use pgs_command::failure::{Cause, Failure, INTERRUPTED, Result, Verdict};
 use pgs_command::interrupt;
 use pgs_command::output::{SCHEMA, milliseconds};
 
@@ -73,11 +73,7 @@ fn failure(error: LoadError) -> Failure {
 }
 
 /// Loads a bitstream, or judges the files.
-pub(crate) fn run(
-    args: &LoadArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &LoadArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     let system = Linux { root: args.system_root.clone() };
     let request = Request {
         bitstream: args.file.clone(),

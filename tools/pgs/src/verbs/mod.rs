@@ -21,7 +21,7 @@ use self::run::RunArgs;
 use self::serve::ServeArgs;
 use self::solve::SolveArgs;
 use pgs_command::common::{CommonArgs, Given};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Result, Verdict};
 
 /// A verb and its options.
 #[derive(Debug, Clone, Subcommand)]
@@ -57,7 +57,7 @@ impl Verb {
     }
 
     /// Runs the verb and writes its results to `out`.
-    pub(crate) fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict, Failure> {
+    pub(crate) fn run(&self, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
         match self {
             Self::Run(args) => run::run(args, common, out),
             Self::Solve(args) => solve::run(args, common, out),

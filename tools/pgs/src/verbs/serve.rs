@@ -12,7 +12,7 @@ use zynq_pgs::StepParameters;
 
 use pgs_command::board::{external_accelerator, not_built};
 use pgs_command::common::{AcceleratorOptions, CommonArgs};
-use pgs_command::failure::{Cause, Failure, Verdict};
+use pgs_command::failure::{Cause, Failure, Result, Verdict};
 use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::{BuildArgs, described};
@@ -67,11 +67,7 @@ struct Tally {
 }
 
 /// Serves until Ctrl-C.
-pub(crate) fn run(
-    args: &ServeArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.build.build().config() };

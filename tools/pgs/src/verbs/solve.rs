@@ -13,7 +13,7 @@ use crate::difference::{self, Difference};
 use crate::traced::TracedArgs;
 use pgs_command::board;
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::numbers::{Bound, grouped};
 use pgs_command::options::build::BuildArgs;
@@ -159,11 +159,7 @@ enum Kind {
 }
 
 /// Takes the step.
-pub(crate) fn run(
-    args: &SolveArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     args.files(common).check()?;
     let mut folder = step_input::load(&args.folder)?;
     let parameters = args.parameters(&folder.parameters);
@@ -246,7 +242,7 @@ pub(crate) fn run(
 }
 
 /// The arrays that the step must reproduce.
-fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected>, Failure> {
+fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected>> {
     let own = &folder.parameters;
     let contact = parameters.contact_iterations;
     let friction = parameters.friction_iterations;
@@ -299,7 +295,7 @@ fn expected(folder: &Folder, parameters: &StepParameters) -> Result<Vec<Expected
 }
 
 /// Reads the array in `file`, which the property must equal after the step.
-fn state(folder: &Folder, file: &str, property: State) -> Result<Expected, Failure> {
+fn state(folder: &Folder, file: &str, property: State) -> Result<Expected> {
     let path = &folder.path.join(file);
     let shape = Dimensions(vec![Some(folder.bodies.len()), Some(property.width())]);
     let (_, values) = npy::read::<f32>(path, &shape).map_err(Failure::input)?;

@@ -109,7 +109,7 @@ fn every_file_that_finds_no_room_has_a_next_step() {
         (&run, "--poses", "poses.npz"),
         (&run, "--poses", "poses.glb"),
         (&run, "--view", "page.html"),
-        (&run, "--picture", "last.svg"),
+        (&run, "--picture", "last.png"),
         (&run, "--trace", "step.json"),
         (&solve, "--vcd", "step.vcd"),
         (&solve, "--timeline", "step.svg"),

@@ -61,6 +61,4 @@ fn waits_beyond_the_counter_leave_the_stalls_open() {
     let slowed = [&scene[..], &["--fault", fault]].concat();
     let step = &json(&slowed)["steps"][0];
     assert_eq!((&step["limit"], &step["cycles"]["stalls"]), (&"unknown".into(), &Value::Null));
-    let table = run([&slowed[..], &["--wide"]].concat()).stdout;
-    assert!(table.contains(" >=4.29e9 ") && table.contains(" unknown "), "{table}");
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use pgs_command::board::OpenBoard;
 use pgs_command::common::{AcceleratorChoice, CommonArgs};
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
 use pgs_command::step_input;
@@ -162,7 +162,7 @@ fn vector(b: [f64; 3], a: [f64; 3]) -> [f64; 3] {
 }
 
 /// Steps both boards.
-fn measure(args: &CompareArgs, session: &Session) -> Result<Part, Failure> {
+fn measure(args: &CompareArgs, session: &Session) -> Result<Part> {
     let common = &session.emulated();
     let folder = args.input.as_deref().map(step_input::load).transpose()?;
     let own = folder.as_ref().map_or_else(StepParameters::default, |folder| folder.parameters);
@@ -202,7 +202,7 @@ fn open<'a>(
     common: &CommonArgs,
     folder: Option<&'a Folder>,
     gravity: [f32; 3],
-) -> Result<(Side<'a>, Side<'a>), Failure> {
+) -> Result<(Side<'a>, Side<'a>)> {
     let open = |name, spec: SideSpec, accelerator: &AcceleratorChoice| {
         let world = |opened: &_| match folder {
             Some(folder) => {
@@ -238,11 +238,7 @@ struct Taken {
 }
 
 impl Course {
-    fn take<'a>(
-        &self,
-        sides: &mut (Side<'a>, Side<'a>),
-        session: &Session,
-    ) -> Result<Taken, Failure> {
+    fn take<'a>(&self, sides: &mut (Side<'a>, Side<'a>), session: &Session) -> Result<Taken> {
         let world = &sides.0.run.world;
         let moving = moving(world.bodies(), world.shapes());
         let mut crew = Crew::new("compare", 1);

@@ -14,7 +14,7 @@ use crate::permutation::{self, Permutation};
 use crate::study::run::{Run, World};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{BoardName, CommonArgs};
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::step_input;
 use step_folder::digest;
 
@@ -83,9 +83,9 @@ impl<'a> Side<'a> {
         name: &'static str,
         spec: SideSpec,
         common: CommonArgs,
-        world: impl FnOnce(&OpenBoard) -> Result<World<'a>, Failure>,
+        world: impl FnOnce(&OpenBoard) -> Result<World<'a>>,
         gravity: [f32; 3],
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let common = CommonArgs { board: BoardName::Emulated, ..common };
         let begin = || {
             let mut opened = board::open(&common, &spec.build)?;

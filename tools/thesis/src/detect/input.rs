@@ -1,6 +1,6 @@
 //! Checks that a folder holds bodies and collisions that can be compared.
 
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use step_folder::folder::{
     BODY_INVERSE_MASS, COLLISION_BODIES, COLLISION_COUNT, COLLISION_NORMAL, COLLISION_POINTS,
     Folder,
@@ -22,7 +22,7 @@ pub(super) struct Input(Folder);
 
 impl Input {
     /// Refuses other static bodies than body 0. The scene checks poses.
-    pub(super) fn new(folder: Folder) -> Result<Self, Failure> {
+    pub(super) fn new(folder: Folder) -> Result<Self> {
         let refused = |problem: String| Err(refused(&folder, BODY_INVERSE_MASS, &problem));
         for (body, Body { shape, .. }) in folder.bodies.iter().enumerate() {
             let shape = usize::try_from(*shape).ok().and_then(|shape| folder.shapes.get(shape));
@@ -53,7 +53,7 @@ impl Input {
     }
 
     /// Refuses collisions that belong to other bodies, or are none.
-    pub(super) fn check_collisions(&self) -> Result<(), Failure> {
+    pub(super) fn check_collisions(&self) -> Result<()> {
         let bodies = self.0.bodies.len();
         let mut pairs = std::collections::BTreeSet::new();
         for (collision, found) in self.0.collisions.iter().enumerate() {

@@ -9,7 +9,7 @@ mod show;
 use std::path::PathBuf;
 
 use clap::Args;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::step_input;
 use scene::Scene;
 use serde_json::json;
@@ -64,7 +64,7 @@ pub(crate) struct DetectionArgs {
 }
 
 /// Detects, and compares.
-fn measure(args: &DetectionArgs, _: &Session) -> Result<Part, Failure> {
+fn measure(args: &DetectionArgs, _: &Session) -> Result<Part> {
     let path = &args.input;
     let input = Input::new(step_input::load(path)?)?;
     input.check_collisions()?;

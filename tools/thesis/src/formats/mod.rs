@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use pgs_command::board;
-use pgs_command::failure::Failure;
+use pgs_command::failure::Result;
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::scenes::SceneArgs;
@@ -73,7 +73,7 @@ pub(crate) struct FormatsArgs {
 }
 
 /// Measures the numbers.
-fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
+fn measure(args: &FormatsArgs, session: &Session) -> Result<Part> {
     let step = match &args.input {
         Some(path) => Some(GivenStep::folder(path)?),
         None => stepped(args, session)?,
@@ -111,7 +111,7 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part, Failure> {
 }
 
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
-fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>, Failure> {
+fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>> {
     let build = args.build.build();
     let mut opened = board::open_as(&session.common, &build, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;

@@ -15,7 +15,7 @@ mod windowed;
 use bitstream_model::Bandwidth;
 use clap::builder::PossibleValuesParser;
 use clap::{ArgMatches, Args, Command};
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::number;
 use pgs_interface::profile::{Inertia, Profile, Variant};
@@ -83,7 +83,7 @@ impl StepArgs {
     }
 
     /// The tables of this step.
-    fn part(&self, id: &str, tables: Tables) -> Result<Part, Failure> {
+    fn part(&self, id: &str, tables: Tables) -> Result<Part> {
         let scene = self.scene();
         let tables = tables(&scene);
         if tables.is_empty() {
@@ -134,7 +134,7 @@ impl StepArgs {
 }
 
 /// The tables of the step that the arguments give.
-fn part(args: &ArgMatches, id: &str, tables: Tables) -> Result<Part, Failure> {
+fn part(args: &ArgMatches, id: &str, tables: Tables) -> Result<Part> {
     given::<StepArgs>(args)?.part(id, tables)
 }
 
@@ -146,7 +146,7 @@ const fn formula(
     id: &'static str,
     thesis: &'static str,
     about: &'static str,
-    run: fn(&ArgMatches, &Session) -> Result<Part, Failure>,
+    run: fn(&ArgMatches, &Session) -> Result<Part>,
 ) -> Experiment {
     let (boards, arguments) = (Boards::None, StepArgs::augment_args as fn(Command) -> Command);
     Experiment { id, thesis, about, boards, arguments, run }

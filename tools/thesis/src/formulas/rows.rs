@@ -6,7 +6,7 @@ use pgs_interface::profile::FLOAT;
 
 use crate::index::{Origin, Row};
 use crate::table::{Cell, Table, anchor};
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 
 /// A table of the thesis, and the columns that hold its figures and ours.
@@ -128,7 +128,7 @@ fn of_design(design: &Design, table: &str, what: &str) -> String {
 }
 
 /// The rows of the index that lead to the tables of an experiment.
-pub(super) fn of(section: &str, tables: &[Table]) -> Result<Vec<Row>, Failure> {
+pub(super) fn of(section: &str, tables: &[Table]) -> Result<Vec<Row>> {
     let mut rows = match section {
         "memory" => std::iter::once(device()).chain(DESIGNS.map(logic)).collect(),
         "comparison" => vec![powers()],
@@ -204,13 +204,13 @@ impl Source {
         Failure::new(Cause::Input, format!("the model has no {what} in {}", self.table))
     }
 
-    fn column(&self, table: &Table, key: &str) -> Result<usize, Failure> {
+    fn column(&self, table: &Table, key: &str) -> Result<usize> {
         let place = table.columns.iter().position(|column| column.key == key);
         place.ok_or_else(|| self.missing(key))
     }
 
     /// The first of these cells of a row that is known.
-    fn known(&self, table: &Table, row: &[Cell], keys: &[&str]) -> Result<Option<String>, Failure> {
+    fn known(&self, table: &Table, row: &[Cell], keys: &[&str]) -> Result<Option<String>> {
         for key in keys {
             let cell = &row[self.column(table, key)?];
             if *cell != Cell::Missing {
@@ -221,8 +221,8 @@ impl Source {
     }
 
     /// All rows of a table in one of the index.
-    fn together(&self, table: &Table) -> Result<Row, Failure> {
-        let all = |keys_of: fn(&Figure) -> &[&'static str]| -> Result<String, Failure> {
+    fn together(&self, table: &Table) -> Result<Row> {
+        let all = |keys_of: fn(&Figure) -> &[&'static str]| -> Result<String> {
             let mut figures = Vec::new();
             for figure in self.figures {
                 let mut cells = Vec::new();
@@ -241,7 +241,7 @@ impl Source {
     }
 
     /// A row of the index for each row that has both figures.
-    fn each(&self, table: &Table, names: &[&str]) -> Result<Vec<Row>, Failure> {
+    fn each(&self, table: &Table, names: &[&str]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
         for cells in &table.rows {
             for figure in self.figures {
@@ -252,7 +252,7 @@ impl Source {
                 let subject = names
                     .iter()
                     .map(|name| Ok(cells[self.column(table, name)?].shown()))
-                    .collect::<Result<Vec<_>, Failure>>()?;
+                    .collect::<Result<Vec<_>>>()?;
                 let [recorded, ours] = [recorded, ours].map(|text| text + figure.unit);
                 rows.push(self.row(table, Some(cells), subject.join(", "), recorded, ours));
             }

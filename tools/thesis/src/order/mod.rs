@@ -8,7 +8,7 @@ mod source;
 use std::path::PathBuf;
 
 use clap::Args;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::numbers::grouped;
 use scene::Grid;
 use serde_json::json;
@@ -98,7 +98,7 @@ pub(crate) struct OrderArgs {
 }
 
 /// Orders the collisions in every way and measures them.
-fn measure(args: &OrderArgs, session: &Session) -> Result<Part, Failure> {
+fn measure(args: &OrderArgs, session: &Session) -> Result<Part> {
     let source = Source::load(args, &session.common)?;
     let windows = args
         .depth

@@ -11,7 +11,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters};
 use super::OrderArgs;
 use crate::permutation;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::pile;
 use pgs_command::step_input;
 use step_folder::folder::Folder;
@@ -26,7 +26,7 @@ pub(super) struct Source {
 
 impl Source {
     /// Loads or makes the collisions that the command line asks for.
-    pub(super) fn load(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+    pub(super) fn load(args: &OrderArgs, common: &CommonArgs) -> Result<Self> {
         if let Some(path) = &args.input {
             return Self::folder(path);
         }
@@ -56,7 +56,7 @@ impl Source {
         Self { name, gpu_order, buffers }
     }
 
-    fn folder(path: &Path) -> Result<Self, Failure> {
+    fn folder(path: &Path) -> Result<Self> {
         let folder = step_input::load(path)?;
         let gpu_order = permutation::recorded(path, folder.collisions.len())?;
         let Folder { bodies, collisions, shapes, .. } = folder;
@@ -64,7 +64,7 @@ impl Source {
     }
 
     /// Cubes, after some steps on the board.
-    fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self, Failure> {
+    fn grid(args: &OrderArgs, common: &CommonArgs) -> Result<Self> {
         let scene = if args.steps == 0 {
             let mut scene = pile::build(args.grid, args.drop)?;
             scene.detect();

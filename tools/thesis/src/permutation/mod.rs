@@ -9,7 +9,7 @@ pub(crate) mod colours;
 
 use std::path::Path;
 
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use scene::SplitMix64;
 use step_folder::npy::{self, Dimensions};
 use zynq_pgs::order::{InputBuffers, OrderInput};
@@ -149,7 +149,7 @@ pub(crate) fn shuffled(random: &mut SplitMix64, count: usize) -> Vec<u32> {
 /// # Errors
 ///
 /// Fails where the file is no permutation of that many indices.
-pub(crate) fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>, Failure> {
+pub(crate) fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>> {
     let path = &folder.join(GPU_ORDER);
     // Opening the file reports a name that cannot be looked up.
     if matches!(path.try_exists(), Ok(false)) {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::output::files::Files;
 use scene::Grid;
@@ -58,11 +58,7 @@ impl AllArgs {
 }
 
 /// Measures, draws and writes.
-pub(crate) fn run(
-    args: &AllArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &AllArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     let folder = args.out.as_deref().ok_or_else(|| Failure::input("--all needs --out"))?;
     let read = args.input.as_deref().unwrap_or(Path::new(""));
     Files::of(common).write(write::named(folder)).read_folder(read, |_| false).check()?;

@@ -12,7 +12,7 @@ use crate::command::experiments;
 use crate::experiment::{Part, shown};
 use crate::session::Session;
 use pgs_command::common::{BoardName, CommonArgs};
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::scenes::DROP;
 
@@ -34,11 +34,7 @@ pub(super) struct Report {
 }
 
 /// Runs all experiments.
-pub(super) fn gather(
-    args: &AllArgs,
-    common: &CommonArgs,
-    interrupt: &Interrupt,
-) -> Result<Report, Failure> {
+pub(super) fn gather(args: &AllArgs, common: &CommonArgs, interrupt: &Interrupt) -> Result<Report> {
     let bar = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
@@ -51,7 +47,7 @@ pub(super) fn gather(
     gathered
 }
 
-fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report, Failure> {
+fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report> {
     let mut part = Part::default();
     for (id, words) in args.runs() {
         bar.set_message(id);
@@ -85,7 +81,7 @@ const FORMULAS: [&str; 10] = [
 ];
 
 /// Runs an experiment with these options; also the command that repeats it.
-fn run(id: &str, words: &[String], session: &Session) -> Result<(String, Part), Failure> {
+fn run(id: &str, words: &[String], session: &Session) -> Result<(String, Part)> {
     let named = words.iter().map(|word| quoted(&shown(Path::new(word))));
     let command: Vec<String> =
         ["pgs thesis", id].into_iter().map(str::to_owned).chain(named).collect();

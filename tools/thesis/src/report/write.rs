@@ -9,7 +9,7 @@ use step_folder::replace::{ReplaceError, Replacement};
 
 use super::parts::Report;
 use super::{page, text};
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::output::files::{self, Named};
 
 /// The files beside the figures.
@@ -27,7 +27,7 @@ pub(super) fn named(folder: &Path) -> impl Iterator<Item = Named> {
 }
 
 /// Makes the folder of the report, and sees that files can be written into it.
-pub(super) fn check(folder: &Path) -> Result<(), Failure> {
+pub(super) fn check(folder: &Path) -> Result<()> {
     let figures = folder.join(FIGURES);
     fs::create_dir_all(&figures).map_err(|error| {
         let message = format!("{} cannot be made: {error}", figures.display());
@@ -42,7 +42,7 @@ pub(super) fn check(folder: &Path) -> Result<(), Failure> {
 }
 
 /// Writes the report into a folder that [`check`] has made; the paths of the files.
-pub(super) fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>> {
     let texts = [page::html(report), text::markdown(report), format!("{:#}\n", text::json(report))];
     let mut files: Vec<_> = FILES.map(|file| folder.join(file)).into_iter().zip(texts).collect();
     let pictures = report.part.figures.iter();

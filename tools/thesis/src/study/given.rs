@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use pgs_command::board::OpenBoard;
-use pgs_command::failure::Failure;
+use pgs_command::failure::Result;
 use pgs_command::{pile, step_input};
 use scene::Scene;
 use step_folder::folder::Folder;
@@ -24,7 +24,7 @@ pub(crate) struct GivenStep {
 
 impl GivenStep {
     /// The step of a folder.
-    pub(crate) fn folder(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn folder(path: &Path) -> Result<Self> {
         let folder = step_input::load(path)?;
         Ok(Self {
             bodies: folder.bodies.clone(),
@@ -42,7 +42,7 @@ impl GivenStep {
         opened: &mut OpenBoard,
         parameters: StepParameters,
         session: &Session,
-    ) -> Result<Option<Self>, Failure> {
+    ) -> Result<Option<Self>> {
         opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
         session.watch(opened);
         session.expect(steps.into());

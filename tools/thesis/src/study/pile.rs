@@ -12,7 +12,7 @@ use crate::experiment::{Boards, Experiment, Part, given};
 use crate::figure::Figure;
 use crate::session::Session;
 use pgs_command::board;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::options::scenes::{DROP, ITERATIONS, STEPS};
 use pgs_command::options::solver::time_of;
@@ -45,7 +45,7 @@ fn counted(count: u64, noun: &str) -> String {
     format!("{} {noun}{plural}", grouped(count))
 }
 
-fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Part> {
     let grid = options.grid;
     let (mut scene, mut opened) = pile::open(grid, DROP, &session.emulated(), &Build::default())?;
     session.watch(&mut opened);
@@ -91,7 +91,7 @@ fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
         format!("{cubes}, up to {}", counted(most as u64, "collision")),
     );
     row.command =
-        format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.svg");
+        format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.png");
     let mut part = Part::of(Vec::new());
     part.figure(figure, [row]);
     Ok(part)

@@ -6,7 +6,7 @@ use zynq_pgs::{Body, Collision, Shape, StepParameters, StepReport};
 use crate::permutation::{Arranger, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::step_input;
 use step_folder::folder::Folder;
 
@@ -94,7 +94,7 @@ impl<'a> Run<'a> {
         opened: &mut OpenBoard,
         parameters: &StepParameters,
         session: &Session,
-    ) -> Result<bool, Failure> {
+    ) -> Result<bool> {
         if session.is_interrupted() {
             return Ok(false);
         }
@@ -118,7 +118,7 @@ impl<'a> Run<'a> {
         &mut self,
         session: &Session,
         step: impl FnOnce(&mut [Body], &[Collision]) -> Result<(), String>,
-    ) -> Result<bool, Failure> {
+    ) -> Result<bool> {
         if session.is_interrupted() {
             return Ok(false);
         }

@@ -23,7 +23,7 @@ use crate::index::Row;
 use crate::session::Session;
 use crate::table::{Cell, Table, text};
 use pgs_command::board;
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::output::milliseconds;
 use pgs_command::pile;
@@ -103,7 +103,7 @@ pub(crate) struct Gain {
 }
 
 /// Steps the pile, and times each measured step's search and response.
-fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Part> {
     let Options { grid, drop, .. } = *options;
     let build = Build { threads: Some(1), ..Build::default() };
     let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
@@ -171,7 +171,7 @@ fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
 }
 
 /// The yardstick's time for the step.
-fn respond(scene: &Scene, parameters: &StepParameters) -> Result<Duration, Failure> {
+fn respond(scene: &Scene, parameters: &StepParameters) -> Result<Duration> {
     let (shapes, bodies) = (scene.shapes(), scene.bodies());
     let mut yardstick = Yardstick::new(shapes, bodies, scene.collisions(), parameters);
     yardstick.solve();
@@ -191,7 +191,7 @@ fn measured_response(yardstick: &mut Yardstick) {
 }
 
 /// Processor time that this thread spends.
-fn spent(act: impl FnOnce()) -> Result<Duration, Failure> {
+fn spent(act: impl FnOnce()) -> Result<Duration> {
     let now = || {
         clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).map(Duration::from).map_err(|error| {
             Failure::new(Cause::Hardware, error)

@@ -10,7 +10,7 @@ use crate::experiment::{Boards, Experiment, Part};
 use crate::figure::Figure;
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::described;
 use pgs_command::options::scenes::DROP;
@@ -31,7 +31,7 @@ const STEPS: u32 = 40;
 const SIDE: u16 = 4;
 
 /// Draws a step of the pile on a board; also its cycles.
-fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u64), Failure> {
+fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u64)> {
     let grid = Grid::new(SIDE, SIDE, SIDE).map_err(Failure::input)?;
     let mut scene = Scene::new(&SceneOptions { grid, drop: DROP, ..SceneOptions::default() })
         .map_err(Failure::input)?;
@@ -63,7 +63,7 @@ fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u
     Ok((String::from_utf8_lossy(&svg).into_owned(), cycles))
 }
 
-fn measure(common: &CommonArgs) -> Result<Part, Failure> {
+fn measure(common: &CommonArgs) -> Result<Part> {
     let mut part = Part::of(Vec::new());
     for (profile, id, title, caption) in [
         (

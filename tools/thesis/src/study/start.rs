@@ -15,7 +15,7 @@ use crate::permutation::{self, Permutation};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
 use pgs_command::pile;
@@ -64,7 +64,7 @@ pub(super) struct Start<'a> {
 
 impl<'a> Start<'a> {
     /// Loads the folder or builds the scene; the scene stands at its beginning.
-    pub(super) fn load(args: &'a StartArgs) -> Result<Self, Failure> {
+    pub(super) fn load(args: &'a StartArgs) -> Result<Self> {
         let folder = args.input.as_deref().map(step_input::load).transpose()?;
         let own = folder.as_ref().map_or_else(StepParameters::default, |folder| folder.parameters);
         let parameters = args.deadline.apply(args.solver.apply(own));
@@ -111,7 +111,7 @@ impl<'a> Start<'a> {
         build: &Build,
         common: &CommonArgs,
         session: &Session,
-    ) -> Result<OpenBoard, Failure> {
+    ) -> Result<OpenBoard> {
         let config = self.args.scene.config(build);
         let mut opened = board::open_as(common, build, config)?.stated();
         match &self.folder {
@@ -128,7 +128,7 @@ impl<'a> Start<'a> {
     }
 
     /// A run from here, in an order; as given if none.
-    pub(super) fn run(&self, permutation: Option<Permutation>) -> Result<Run<'_>, Failure> {
+    pub(super) fn run(&self, permutation: Option<Permutation>) -> Result<Run<'_>> {
         let world = match (&self.folder, &self.scene) {
             (Some(folder), _) => World::Folder { folder, bodies: self.bodies.clone() },
             (None, Some(scene)) => World::Scene(Box::new(scene.clone())),
@@ -138,11 +138,7 @@ impl<'a> Start<'a> {
     }
 
     /// Takes the steps before the start on the board; false if Ctrl-C ended them.
-    pub(super) fn step_to(
-        &mut self,
-        opened: &mut OpenBoard,
-        session: &Session,
-    ) -> Result<bool, Failure> {
+    pub(super) fn step_to(&mut self, opened: &mut OpenBoard, session: &Session) -> Result<bool> {
         let Some(scene) = self.scene.as_mut().filter(|_| self.args.from > 0) else {
             return Ok(true);
         };

@@ -152,21 +152,6 @@ fn each_body_has_its_poses_at_the_shared_times() {
 }
 
 #[test]
-fn the_text_has_the_same_document_and_buffer() {
-    let recording = fixture(2);
-    let mut document: Value =
-        serde_json::from_str(&text(&recording).expect("small")).expect("JSON");
-    let uri = document["buffers"][0]["uri"].take();
-    let (expected, buffer) = parsed(&binary(&recording).expect("small"));
-    let length = index(&document["buffers"][0]["byteLength"]);
-    let data =
-        uri.as_str().and_then(|uri| uri.strip_prefix("data:application/octet-stream;base64,"));
-    assert_eq!(data.expect("a data URI"), base64::encode(&buffer[..length]));
-    document["buffers"][0].as_object_mut().expect("an object").remove("uri");
-    assert_eq!(document, expected);
-}
-
-#[test]
 fn without_a_frame_there_is_no_animation() {
     let read = Read::of(&fixture(0));
     assert!(read.document["animations"].is_null());

@@ -2,10 +2,11 @@
 //!
 //! The page's parts are the files beside this module; their data comes from `quantise`.
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use scene::Geometry;
 use serde_json::{Value, json};
 
-use crate::base64;
 use crate::error::ViewError;
 use crate::kinds::surfaces;
 use crate::mesh::{Mesh, dot};
@@ -66,7 +67,7 @@ pub fn page(
         .chain(&[("poses", poses)])
         .map(|(label, text)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(label), escaped(text)))
         .collect();
-    let poses = base64::encode(&found.bytes);
+    let poses = BASE64_STANDARD.encode(&found.bytes);
     let script = SCRIPTS.join("\n");
     let html = filled(
         PAGE,

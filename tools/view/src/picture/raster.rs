@@ -36,11 +36,6 @@ impl Raster {
         self.pixels.get(y * self.width + x).filter(|pixel| pixel.face > 0)
     }
 
-    /// All covered pixels.
-    pub(super) fn covered(&self) -> impl Iterator<Item = &Pixel> {
-        self.pixels.iter().filter(|pixel| pixel.face > 0)
-    }
-
     /// Whether an outline runs between this pixel and the one to the right or below.
     pub(super) fn is_edge(&self, x: usize, y: usize) -> bool {
         let here = self.at(x, y);
@@ -145,6 +140,10 @@ mod tests {
         Face { body, corners, colours: vec![[colour; 3]; 4] }
     }
 
+    fn covered(raster: &Raster) -> usize {
+        raster.pixels.iter().filter(|pixel| pixel.face > 0).count()
+    }
+
     #[test]
     fn the_nearer_face_covers_the_other_whatever_the_order() {
         for order in [[0, 1], [1, 0]] {
@@ -156,7 +155,7 @@ mod tests {
             assert_eq!(raster.at(2, 3).map(|pixel| pixel.colour), Some([50; 3]));
             assert_eq!(raster.at(4, 3).map(|pixel| (pixel.body, pixel.face)), Some((2, 2)));
             assert!(raster.at(8, 3).is_none() && raster.at(2, 1).is_none());
-            assert_eq!(raster.covered().count(), 16 + 16 - 8);
+            assert_eq!(covered(&raster), 16 + 16 - 8);
             assert!(raster.is_edge(2, 3) && raster.is_edge(0, 3) && !raster.is_edge(4, 3));
         }
     }
@@ -170,6 +169,6 @@ mod tests {
         let mut behind = square(1, 1.0, 0.1, 50.0);
         behind.corners.reverse();
         raster.fill(1, &behind);
-        assert_eq!(raster.covered().count(), 0);
+        assert_eq!(covered(&raster), 0);
     }
 }

@@ -12,7 +12,7 @@ use super::trial::{Bench, CellResult};
 use super::{FaultsArgs, list, try_all};
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Result, Verdict};
 use pgs_command::output::SCHEMA;
 use pgs_command::output::table::{Cell as Shown, Table, text};
 
@@ -42,11 +42,7 @@ impl Pair {
 }
 
 /// Tries all cells on both.
-pub(super) fn run(
-    args: &FaultsArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(super) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     let profile = args.profile.unwrap_or(&FLOAT);
     let bench = Bench::like_simulator(profile)?;
     let cells = cells::for_simulator(&bench);
@@ -83,7 +79,7 @@ pub(super) fn run(
     Ok(if equal { Verdict::Done } else { Verdict::Differs })
 }
 
-fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<(), Failure> {
+fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<()> {
     let mut table = Table::new("pairs", "Kinds of faults on the model and on the hardware");
     let mut rows: Vec<[&str; 4]> = Vec::new();
     for pair in pairs {

@@ -22,7 +22,7 @@ use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
 use pgs_command::common::{AcceleratorChoice, AcceleratorOptions, CommonArgs};
 use pgs_command::environment;
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Result, Verdict};
 use pgs_command::output::SCHEMA;
 use pgs_command::output::progress::progress_bar;
 
@@ -68,11 +68,7 @@ struct ProfileResults {
 }
 
 /// Tries all cells.
-pub(crate) fn run(
-    args: &FaultsArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     if environment::variable(environment::LOG).is_none() {
         // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
@@ -118,7 +114,7 @@ fn list(
     profiles: &[(String, Vec<Cell>)],
     common: &CommonArgs,
     out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+) -> Result<Verdict> {
     if common.json {
         let of_profile = |(name, cells): &(String, Vec<Cell>)| {
             let cells: Vec<_> = cells.iter().map(Cell::to_json).collect();

@@ -15,7 +15,7 @@ use super::cells::Cell;
 use super::expected::Expected;
 use pgs_command::board;
 use pgs_command::common::AcceleratorChoice;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::scenes::CONTACT_REACH;
 
 /// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for
@@ -127,7 +127,7 @@ fn open(
     config: BoardConfig,
     choice: &AcceleratorChoice,
     shapes: &[Shape],
-) -> Result<(EmulatedBoard, Accelerator), Failure> {
+) -> Result<(EmulatedBoard, Accelerator)> {
     let emulated = board::emulated_board(config, choice)?;
     let accelerator = reopen(&emulated).map_err(board::unusable);
     let mut accelerator = accelerator?;
@@ -162,7 +162,7 @@ impl State {
     }
 
     /// A pile of cubes some steps after its drop, on a board without faults.
-    fn settled(side: u16, config: BoardConfig, start: Start) -> Result<Self, Failure> {
+    fn settled(side: u16, config: BoardConfig, start: Start) -> Result<Self> {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
@@ -204,7 +204,7 @@ impl State {
 
 impl Bench {
     /// The setting of a profile, with a pile of 27 cubes and one of 64, for the model.
-    pub(super) fn new(profile: &'static Profile, start: Start) -> Result<Self, Failure> {
+    pub(super) fn new(profile: &'static Profile, start: Start) -> Result<Self> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let length_width = LENGTH_WIDTH;
         let config = BoardConfig { profile, length_width, delays, ..BoardConfig::default() };
@@ -212,13 +212,13 @@ impl Bench {
     }
 
     /// The setting of a board that equals one with a simulator, for the model.
-    pub(super) fn like_simulator(profile: &'static Profile) -> Result<Self, Failure> {
+    pub(super) fn like_simulator(profile: &'static Profile) -> Result<Self> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
         let config = BoardConfig { profile, delays, ..BoardConfig::default() };
         Self::of(config, Start::Cold, SIMULATOR_DEADLINE)
     }
 
-    fn of(config: BoardConfig, start: Start, deadline: Duration) -> Result<Self, Failure> {
+    fn of(config: BoardConfig, start: Start, deadline: Duration) -> Result<Self> {
         let (small, large) = (State::settled(3, config, start)?, State::settled(4, config, start)?);
         let parameters = start.parameters().with_deadline(deadline);
         let accelerator = AcceleratorChoice::Model;

@@ -14,7 +14,7 @@ use zynq_pgs::platform::{
 use inventory::{Buffer, Node, explained, state, unreadable_json};
 use pgs_command::board;
 use pgs_command::common::{BoardOptions, CommonArgs};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::SCHEMA;
 
 const EXAMPLES: &str = "\
@@ -38,11 +38,7 @@ pub(crate) struct ListArgs {
 }
 
 /// Lists the boards.
-pub(crate) fn run(
-    args: &ListArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &ListArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     let system = System::under(&args.system_root);
     let (kind, reason) = board::choose(&common.board, &system);
     let chosen = board::kind_text(kind);

@@ -13,7 +13,7 @@ use zynq_pgs_view::picture::Picture;
 use zynq_pgs_view::{ViewError, gltf, npz};
 
 use super::film::{Film, Rhythm};
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::output::files::{Named, check_folder, unwritten};
 
@@ -24,10 +24,13 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb or .gltf for 3D programs; `docs/command-line.md` has
-    /// the arrays.
-    #[arg(long, value_name = "FILE", value_parser = poses_file)]
-    poses: Option<PosesFile>,
+    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the arrays.
+    #[arg(
+        long,
+        value_name = "FILE.npz|glb",
+        value_parser = |text: &str| with_extension(text, &["npz", "glb"])
+    )]
+    poses: Option<PathBuf>,
     /// Write a page that plays the poses in a browser, without a network.
     #[arg(
         long,
@@ -38,8 +41,8 @@ pub(crate) struct FileArgs {
     /// Write a picture of the last step.
     #[arg(
         long,
-        value_name = "FILE.png|svg",
-        value_parser = |text: &str| with_extension(text, &["png", "svg"])
+        value_name = "FILE.png",
+        value_parser = |text: &str| with_extension(text, &["png"])
     )]
     picture: Option<PathBuf>,
     /// Record every K-th step [default: the smallest K that gives at most 200 frames]
@@ -62,31 +65,6 @@ pub(crate) struct FileArgs {
         value_parser = clap::value_parser!(u16).range(1..=1000)
     )]
     frames_per_second: Option<u16>,
-}
-
-/// A file for poses, and its format.
-#[derive(Debug, Clone)]
-struct PosesFile {
-    path: PathBuf,
-    format: PosesFormat,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum PosesFormat {
-    Npz,
-    /// Text, with the buffer inside.
-    Gltf,
-    Glb,
-}
-
-fn poses_file(text: &str) -> Result<PosesFile, String> {
-    let path = with_extension(text, &["npz", "glb", "gltf"])?;
-    let format = match extension(&path) {
-        "gltf" => PosesFormat::Gltf,
-        "glb" => PosesFormat::Glb,
-        _ => PosesFormat::Npz,
-    };
-    Ok(PosesFile { path, format })
 }
 
 fn extension(path: &Path) -> &str {
@@ -124,16 +102,14 @@ impl Unfit {
 
 impl FileArgs {
     /// Refuses files that could not be written after the run.
-    pub(super) fn check(&self) -> Result<(), Failure> {
+    pub(super) fn check(&self) -> Result<()> {
         self.given().try_for_each(|(_, path)| check_folder(path))
     }
 
     /// The options that the command line has, with their files.
     fn given(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
-        let poses = self.poses.as_ref().map(|poses| &poses.path);
-        let (view, picture) = (self.view.as_ref(), self.picture.as_ref());
-        let all = [("poses", poses), ("view", view), ("picture", picture)];
-        all.into_iter().filter_map(|(name, path)| Some((name, path?)))
+        let all = [("poses", &self.poses), ("view", &self.view), ("picture", &self.picture)];
+        all.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?)))
     }
 
     /// The files, to be told from every other file of the command.
@@ -142,12 +118,7 @@ impl FileArgs {
     }
 
     /// Begins to record a scene at its start; `None` if no file shows its course.
-    pub(super) fn film(
-        &self,
-        scene: &Scene,
-        steps: u32,
-        time_step: f32,
-    ) -> Result<Option<Film>, Failure> {
+    pub(super) fn film(&self, scene: &Scene, steps: u32, time_step: f32) -> Result<Option<Film>> {
         if self.poses.is_none() && self.view.is_none() {
             return Ok(None);
         }
@@ -160,15 +131,11 @@ impl FileArgs {
     }
 
     /// Writes the picture of a scene.
-    pub(super) fn write_picture(&self, scene: &Scene) -> Result<Option<Written>, Failure> {
+    pub(super) fn write_picture(&self, scene: &Scene) -> Result<Option<Written>> {
         let Some(path) = &self.picture else { return Ok(None) };
         let picture = Picture::of_all(scene.bodies(), scene.geometries());
         let Picture { width, height, .. } = picture;
-        let bytes = match extension(path) {
-            "svg" => picture.svg().map(String::into_bytes),
-            _ => picture.png(),
-        };
-        let bytes = bytes.map_err(|error| Failure::new(Cause::Output, error))?;
+        let bytes = picture.png().map_err(|error| Failure::new(Cause::Output, error))?;
         let document = json!({ "width": width, "height": height });
         Written::new("picture", path, &bytes, format!("{width} x {height} pixels"), document)
             .map(Some)
@@ -180,16 +147,15 @@ impl FileArgs {
         film: &Film,
         title: &str,
         facts: &[(&str, String)],
-    ) -> Result<Vec<Written>, Failure> {
+    ) -> Result<Vec<Written>> {
         let recording = film.recording();
         let frames = recording.frames().len();
         let bodies = grouped(recording.bodies() as u64);
         let mut written = Vec::new();
-        if let Some(PosesFile { path, format }) = &self.poses {
-            let bytes = match format {
-                PosesFormat::Npz => npz::bytes(recording).map_err(ViewError::from),
-                PosesFormat::Gltf => gltf::text(recording).map(String::into_bytes),
-                PosesFormat::Glb => gltf::binary(recording),
+        if let Some(path) = &self.poses {
+            let bytes = match extension(path) {
+                "glb" => gltf::binary(recording),
+                _ => npz::bytes(recording).map_err(ViewError::from),
             };
             let bytes = bytes.map_err(|error| Unfit::failure(path, error))?;
             let text = format!("{frames} frames of {bodies} bodies");
@@ -225,7 +191,7 @@ impl Written {
         bytes: &[u8],
         what: String,
         mut document: Value,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         replace(path, |file| file.write_all(bytes)).map_err(unwritten)?;
         document["path"] = path.display().to_string().into();
         document["bytes"] = bytes.len().into();

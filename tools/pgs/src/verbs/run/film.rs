@@ -6,7 +6,7 @@ use scene::{Scene, StepClock, interpolate};
 use zynq_pgs::Body;
 use zynq_pgs_view::{Recording, ViewError};
 
-use pgs_command::failure::{Cause, Failure};
+use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::options::solver::time_of;
 
 /// Part of a step that counts as none: the clock counts nanoseconds.
@@ -78,7 +78,7 @@ pub(super) struct Film {
 
 impl Film {
     /// Begins with the scene at its start.
-    pub(super) fn new(scene: &Scene, rhythm: Rhythm, time_step: f32) -> Result<Self, Failure> {
+    pub(super) fn new(scene: &Scene, rhythm: Rhythm, time_step: f32) -> Result<Self> {
         let recording = Recording::new(scene.bodies(), scene.geometries());
         let mut film = Self { recording, rhythm, time_step };
         film.add(0, 0.0, scene.bodies())?;
@@ -86,7 +86,7 @@ impl Film {
     }
 
     /// Adds the frames that are due after `steps` steps.
-    pub(super) fn step(&mut self, steps: u32, scene: &Scene) -> Result<(), Failure> {
+    pub(super) fn step(&mut self, steps: u32, scene: &Scene) -> Result<()> {
         match &mut self.rhythm {
             Rhythm::Steps(every) if steps.is_multiple_of(*every) => {
                 self.add(steps, 0.0, scene.bodies())
@@ -103,7 +103,7 @@ impl Film {
     }
 
     /// Adds the scene after the last step.
-    pub(super) fn end(&mut self, steps: u32, scene: &Scene) -> Result<(), Failure> {
+    pub(super) fn end(&mut self, steps: u32, scene: &Scene) -> Result<()> {
         self.add(steps, 0.0, scene.bodies())
     }
 
@@ -117,7 +117,7 @@ impl Film {
     }
 
     /// Adds bodies some steps, and a part of one, after the start.
-    fn add(&mut self, steps: u32, part: f32, bodies: &[Body]) -> Result<(), Failure> {
+    fn add(&mut self, steps: u32, part: f32, bodies: &[Body]) -> Result<()> {
         let time = time_of(f64::from(steps) + f64::from(part), self.time_step);
         self.recording.add(steps, time, bodies).map_err(not_shown)
     }

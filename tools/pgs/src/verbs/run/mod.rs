@@ -20,14 +20,14 @@ use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
 use self::files::{FileArgs, Written};
 use self::film::Film;
-use self::row::{ALL_COLUMNS, Row, columns, step};
+use self::row::{Row, columns, step};
 use self::summary::Totals;
 use crate::bug_report::FaultArgs;
 use crate::footprint::Footprint;
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
-use pgs_command::failure::{Failure, Verdict};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::OrderingArgs;
@@ -53,7 +53,6 @@ Examples:
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
-  pgs run --wide                                 every column: cycles by kind, host time by phase
   pgs run --bandwidth unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
@@ -90,9 +89,6 @@ pub(crate) struct RunArgs {
     /// Show every N-th step [default: a fifteenth of the steps]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
-    /// Show every column, in lines of 170 characters.
-    #[arg(long)]
-    wide: bool,
     #[command(flatten)]
     solver: SolverArgs,
     /// Begin each step with the impulses of the last one
@@ -120,7 +116,7 @@ pub(crate) struct RunArgs {
     pair_friction: Option<bool>,
     /// Step the same scene beside this one without a warm start and with one friction, and show how
     /// deep its bodies sink and how much they move [default: on for --scene shapes with a warm
-    /// start, unless a fault is planned, --wide is given or the energy of a step is measured]
+    /// start, unless a fault is planned or the energy of a step is measured]
     #[arg(
         long,
         value_name = "BOOL",
@@ -183,7 +179,7 @@ impl RunArgs {
     }
 
     /// The board whose step is recorded, and the number of the step.
-    fn tracing(&self, opened: &OpenBoard) -> Result<Option<(Tracing<'_>, u32)>, Failure> {
+    fn tracing(&self, opened: &OpenBoard) -> Result<Option<(Tracing<'_>, u32)>> {
         let (step, steps) = (self.traced_step.unwrap_or(self.steps()), self.steps());
         if self.traced_step.is_some() && !self.traced.is_given() {
             let error = "--traced-step names a step, and no file to write is named";
@@ -198,13 +194,9 @@ impl RunArgs {
 
     /// The scene that is stepped beside this one, if one is. A planned fault names a step of the
     /// board by its number, and the steps of a second scene would shift the numbers.
-    fn beside(
-        &self,
-        parameters: &StepParameters,
-        has_sensors: bool,
-    ) -> Result<Option<Cold>, Failure> {
+    fn beside(&self, parameters: &StepParameters, has_sensors: bool) -> Result<Option<Cold>> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
-        let wanted = beside::is_stepped(self.beside_cold, shown && !self.wide, has_sensors);
+        let wanted = beside::is_stepped(self.beside_cold, shown, has_sensors);
         let scene = || self.scene.build(&self.build.build());
         wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
     }
@@ -240,11 +232,7 @@ impl Course {
 }
 
 /// Steps the scene.
-pub(crate) fn run(
-    args: &RunArgs,
-    common: &CommonArgs,
-    out: &mut dyn Write,
-) -> Result<Verdict, Failure> {
+pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     args.files.check()?;
     let outputs = args.files.named().chain(args.traced.named()).chain(args.faults.named());
     Files::of(common).write(outputs).check()?;
@@ -295,7 +283,7 @@ fn write_files(
     opened: &OpenBoard,
     scene: &Scene,
     course: &mut Course,
-) -> Result<Vec<Written>, Failure> {
+) -> Result<Vec<Written>> {
     let mut written = Vec::new();
     if let Some(film) = &mut course.film {
         film.end(course.done, scene)?;
@@ -321,7 +309,7 @@ fn take_steps(
     (scene, course): (&mut Scene, &mut Course),
     interrupt: &Interrupt,
     out: &mut dyn Write,
-) -> Result<(), Failure> {
+) -> Result<()> {
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
     let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
@@ -371,17 +359,9 @@ fn take_steps(
             }
             course.documents.push(document);
         } else if args.is_shown(course.done) {
-            progress.suspend(|| match args.wide {
-                true => line(out, &ALL_COLUMNS, row.all_cells()),
-                false => {
-                    let cells = beside.map(Beside::cells).into_iter().flatten();
-                    line(
-                        out,
-                        &all_columns(opened, beside.is_some()),
-                        row.cells().into_iter().chain(cells),
-                    )
-                }
-            })?;
+            let cells = row.cells().into_iter();
+            let cells = cells.chain(beside.map(Beside::cells).into_iter().flatten());
+            progress.suspend(|| line(out, &all_columns(opened, beside.is_some()), cells))?;
             out.flush()?;
         }
         course.last = Some(row);
@@ -412,9 +392,6 @@ fn print_heading(
     fact(out, "scene", &args.scene.text())?;
     fact(out, "order", &order::with_reason(first))?;
     writeln!(out)?;
-    match args.wide {
-        true => heading(out, &ALL_COLUMNS)?,
-        false => heading(out, &all_columns(opened, beside_cold))?,
-    }
+    heading(out, &all_columns(opened, beside_cold))?;
     out.flush()
 }

@@ -7,9 +7,9 @@ use serde_json::Value;
 use zynq_pgs::{Accelerator, ContactMemory, StepParameters, StepReport, WarmCollisions};
 
 use pgs_command::board::is_cancelled;
-use pgs_command::numbers::{Bound, grouped};
+use pgs_command::numbers::grouped;
 use pgs_command::output::table::Fixed;
-use pgs_command::output::{limit_text, milliseconds, report_json};
+use pgs_command::output::{milliseconds, report_json};
 
 /// Share of the last step's impulses that a warm step begins with (Bullet's).
 const WARM_FACTOR: f32 = 0.85;
@@ -41,28 +41,6 @@ pub(super) const fn columns(is_emulated: bool) -> [Fixed; 6] {
     ]
 }
 
-/// All columns.
-pub(super) const ALL_COLUMNS: [Fixed; 18] = [
-    Fixed { name: "step", unit: "", width: 5 },
-    Fixed { name: "pairs", unit: "", width: 8 },
-    Fixed { name: "ground", unit: "pairs", width: 6 },
-    Fixed { name: "empty", unit: "entries", width: 7 },
-    Fixed { name: "impulses", unit: "N s", width: 10 },
-    Fixed { name: "energy", unit: "kJ", width: 9 },
-    Fixed { name: "formula", unit: "cycles", width: 10 },
-    Fixed { name: "stalls", unit: "cycles", width: 12 },
-    Fixed { name: "waits", unit: "cycles", width: 9 },
-    Fixed { name: "modelled", unit: "ms", width: 9 },
-    Fixed { name: "moved", unit: "MB", width: 7 },
-    Fixed { name: "limit", unit: "", width: 8 },
-    Fixed { name: "hazards", unit: "", width: 9 },
-    Fixed { name: "detect", unit: "host ms", width: 7 },
-    Fixed { name: "order", unit: "host ms", width: 7 },
-    Fixed { name: "pack", unit: "host ms", width: 7 },
-    Fixed { name: "device", unit: "host ms", width: 7 },
-    Fixed { name: "unpack", unit: "host ms", width: 7 },
-];
-
 impl Row {
     /// Host time of the whole step, with the emulation of the board.
     pub(super) fn host(&self) -> Duration {
@@ -79,36 +57,6 @@ impl Row {
             format!("{:.3}", self.before_gravity / 1e3),
             format!("{:.3}", milliseconds(self.report.modelled_time())),
             format!("{:.1}", milliseconds(self.host())),
-        ]
-    }
-
-    pub(super) fn all_cells(&self) -> [String; ALL_COLUMNS.len()] {
-        let StepReport { cycles, host, saturated, .. } = &self.report;
-        let impulses = match self.report.impulse_sum {
-            Some(sum) => format!("{sum:.1}"),
-            None if saturated.impulse_sum => Bound::AtLeast.short(StepReport::IMPULSE_SUM_MAX),
-            None => "-".to_owned(),
-        };
-        let bytes = self.report.bytes_to_device + self.report.bytes_from_device;
-        [
-            self.step.to_string(),
-            grouped(self.report.collisions),
-            grouped(self.ground_pairs as u64),
-            grouped(self.report.empty),
-            impulses,
-            format!("{:.3}", self.kinetic_energy / 1e3),
-            Bound::AtLeast.cell(saturated.work, cycles.work),
-            Bound::AtMost.cell(saturated.stalls(), cycles.stalls),
-            Bound::AtLeast.cell(saturated.waits, cycles.waits),
-            format!("{:.3}", milliseconds(self.report.modelled_time())),
-            format!("{:.1}", bytes as f64 / 1e6),
-            limit_text(self.report.limit()).to_owned(),
-            Bound::AtLeast.cell(saturated.hazards, self.report.hazards),
-            format!("{:.1}", milliseconds(self.detect)),
-            format!("{:.1}", milliseconds(host.order)),
-            format!("{:.1}", milliseconds(host.validate + host.pack)),
-            format!("{:.1}", milliseconds(host.start + host.wait)),
-            format!("{:.1}", milliseconds(host.unpack + host.commit)),
         ]
     }
 

@@ -18,7 +18,7 @@ use crate::histogram::Histogram;
 use crate::permutation::Permutation;
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::is_sequential;
 
@@ -160,7 +160,7 @@ impl OverPairs {
 }
 
 /// Steps all runs and compares them.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome> {
     let mut start = Start::load(&options.start)?;
     let mut opened = start.open(&options.build.build(), &session.common, session)?;
     if !is_sequential(opened.accelerator.capabilities()) {
@@ -216,7 +216,7 @@ fn compare(
     start: &Start<'_>,
     opened: &mut OpenBoard,
     session: &Session,
-) -> Result<(Comparison, bool), Failure> {
+) -> Result<(Comparison, bool)> {
     let [original, new] = orders.map(|order| match order {
         Some(order) => order.text(),
         None => "as-given".to_owned(),

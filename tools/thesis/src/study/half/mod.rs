@@ -24,7 +24,7 @@ use crate::narrow::{NarrowFormat, carried};
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
 use pgs_command::common::CommonArgs;
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -162,7 +162,7 @@ struct Side<'a> {
 }
 
 impl<'a> Side<'a> {
-    fn new(opened: OpenBoard, start: &'a Start<'_>) -> Result<Self, Failure> {
+    fn new(opened: OpenBoard, start: &'a Start<'_>) -> Result<Self> {
         let poses = NarrowFormat::of(opened.accelerator.capabilities().variant.numbers.poses);
         Ok(Self { opened: Some(opened), run: start.run(None)?, poses })
     }
@@ -172,7 +172,7 @@ impl<'a> Side<'a> {
         common: &CommonArgs,
         start: &'a Start<'_>,
         session: &Session,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         match numbers {
             SixteenBits::Board(build) => Self::new(start.open(build, common, session)?, start),
             SixteenBits::Words(format) => {
@@ -187,7 +187,7 @@ impl<'a> Side<'a> {
         start: &Start<'_>,
         moving: &[bool],
         session: &Session,
-    ) -> Result<Option<f64>, Failure> {
+    ) -> Result<Option<f64>> {
         let before = self.run.bodies().to_vec();
         let taken = match (&mut self.opened, self.poses) {
             (Some(opened), _) => self.run.step(opened, &start.parameters, session)?,
@@ -203,7 +203,7 @@ impl<'a> Side<'a> {
 }
 
 /// Steps all boards and compares them with float.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome, Failure> {
+pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome> {
     let common = session.emulated();
     let mut start = Start::load(&options.start)?;
     let original: Build = ORIGINAL.parse().map_err(Failure::input)?;

@@ -24,7 +24,7 @@ use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use crate::study::given::GivenStep;
 use pgs_command::board;
-use pgs_command::failure::Failure;
+use pgs_command::failure::Result;
 use pgs_command::options::scenes;
 use pgs_command::options::solver::SolverArgs;
 use pgs_command::pile;
@@ -128,7 +128,7 @@ pub(crate) struct Rules {
 }
 
 /// Takes the step with each number of passes.
-fn measure(options: &Options, session: &Session) -> Result<Option<Outcome>, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Option<Outcome>> {
     let mut opened = board::open(&session.common, &Build::default())?.stated();
     let (name, step) = match &options.input {
         Some(path) => (path.display().to_string(), Some(GivenStep::folder(path)?)),

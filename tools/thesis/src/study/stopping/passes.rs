@@ -7,7 +7,7 @@ use super::residual::{Part, Problem, Residuals};
 use super::{ORDER, Session};
 use crate::study::given::GivenStep;
 use pgs_command::board::{self, OpenBoard};
-use pgs_command::failure::Failure;
+use pgs_command::failure::Result;
 use pgs_command::step_input;
 
 /// The state after a number of passes.
@@ -47,7 +47,7 @@ impl Course<'_> {
         &mut self,
         most: u32,
         split: impl Fn(u32) -> [u32; 2],
-    ) -> Result<(Vec<Pass>, bool), Failure> {
+    ) -> Result<(Vec<Pass>, bool)> {
         let counted = match split(1) {
             [_, 0] => Counted::Contact,
             _ => Counted::Friction,
@@ -71,7 +71,7 @@ impl Course<'_> {
     }
 
     /// Takes the step once; none if Ctrl-C ended it.
-    pub(super) fn once(&mut self, split: [u32; 2]) -> Result<Option<Pass>, Failure> {
+    pub(super) fn once(&mut self, split: [u32; 2]) -> Result<Option<Pass>> {
         Ok(self.solve(split)?.map(|(bodies, impulses)| Pass {
             passes: split[0] + split[1],
             residuals: self.problem.residuals(&bodies, &impulses),
@@ -82,7 +82,7 @@ impl Course<'_> {
 
     /// The velocities and impulses after the passes. Without a pass nothing has changed, and the
     /// board takes no step.
-    fn solve(&mut self, [contact, friction]: [u32; 2]) -> Result<Option<Solved>, Failure> {
+    fn solve(&mut self, [contact, friction]: [u32; 2]) -> Result<Option<Solved>> {
         let mut bodies = self.step.bodies.clone();
         if contact + friction == 0 {
             self.session.advance();

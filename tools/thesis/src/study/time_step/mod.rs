@@ -14,7 +14,7 @@ use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
-use pgs_command::failure::Failure;
+use pgs_command::failure::{Failure, Result};
 use pgs_command::options::scenes;
 
 const EXAMPLES: &str = "\
@@ -118,7 +118,7 @@ struct Sample {
 }
 
 /// Takes the steps of every length.
-fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
+fn measure(options: &Options, session: &Session) -> Result<Part> {
     scenes::check_rows(options.grid)?;
     let mut opened = board::open(&session.common, &Build::default())?.stated();
     session.watch(&mut opened);
@@ -144,7 +144,7 @@ fn measure(options: &Options, session: &Session) -> Result<Part, Failure> {
     Ok(Part { complete: rows.len() == RATES.len(), ..show::part(options, &rows) })
 }
 
-fn scene(options: &Options) -> Result<Scene, Failure> {
+fn scene(options: &Options) -> Result<Scene> {
     let Options { grid, drop, .. } = *options;
     Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).map_err(Failure::input)
 }
@@ -167,7 +167,7 @@ impl Run<'_> {
     }
 
     /// Throws a body of the scene's shape; none if Ctrl-C ended it.
-    fn fly(&mut self, scene: &Scene) -> Result<Option<Flight>, Failure> {
+    fn fly(&mut self, scene: &Scene) -> Result<Option<Flight>> {
         let position = [0.0, HEIGHT, 0.0];
         let pose = Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] };
         let velocity = Velocity { linear: THROWN, angular: [0.0; 3] };
@@ -198,11 +198,7 @@ impl Run<'_> {
     }
 
     /// Drops the pile; its measures and the positions at the end, or none if Ctrl-C ended it.
-    fn pile(
-        &mut self,
-        options: &Options,
-        shortest: Option<&[[f64; 3]]>,
-    ) -> Result<Option<Ended>, Failure> {
+    fn pile(&mut self, options: &Options, shortest: Option<&[[f64; 3]]>) -> Result<Option<Ended>> {
         let mut scene = scene(options)?;
         let (mut cycles, mut board) = (0_u64, 0.0);
         let (mut deepest, mut kinetic_most) = (0.0_f64, 0.0_f64);
