@@ -20,6 +20,8 @@ pub struct Build {
     pub inertia: Option<Inertia>,
     /// Behaviour on read-after-write hazards.
     pub hazards: Option<Hazards>,
+    /// Depth of the issue queue, collisions; 0: none.
+    pub queue: Option<u32>,
     /// Hazard window, issue slots.
     pub window: Option<u32>,
     /// Memory bandwidth.
@@ -51,6 +53,7 @@ impl Build {
             numbers: (numbers != profile.numbers).then_some(numbers),
             inertia: self.inertia.unwrap_or(default.inertia),
             hazards: self.hazards.unwrap_or(default.hazards),
+            queue: self.queue,
             window_slots: self.window,
             bandwidth: self.bandwidth.unwrap_or(default.bandwidth),
             length_width: self.length_width.unwrap_or(default.length_width),
@@ -88,6 +91,7 @@ impl Build {
             arithmetic,
             inertia: unlike(config.inertia, default.inertia),
             hazards: unlike(config.hazards, default.hazards),
+            queue: config.queue,
             window: config.window_slots,
             bandwidth: unlike(config.bandwidth, default.bandwidth),
             length_width: unlike(config.length_width, default.length_width),

@@ -19,6 +19,7 @@
 //! | `profile` | the name of a [profile](pgs_interface::profile::PROFILES) | `float` |
 //! | `arithmetic` | precision of the operators: `f32`, `binary16` | the profile's |
 //! | `hazards` | on a hazard wait, or read the stale velocity: `interlocked`, `unchecked` | `interlocked` |
+//! | `queue` | depth of the issue queue in collisions, 0 for none; only an interlocked `float` has one | the profile's |
 //! | `window` | hazard window in issue slots | the profile's |
 //! | `inertia` | inertia of a body, equal about every axis or any: `isotropic`, `world` | `isotropic` |
 //! | `bandwidth` | memory bandwidth in GB/s, or `unlimited` | 12.8 |

@@ -5,7 +5,7 @@ use pgs_interface::profile::{PROFILES, Profile};
 use super::build::Build;
 use super::values::{
     HAZARDS, INERTIA, PRECISIONS, SWITCH, address_width, bandwidth, bandwidth_text, fence,
-    length_width, name_of, named, threads, window,
+    length_width, name_of, named, queue, threads, window,
 };
 
 /// One option of a build.
@@ -66,10 +66,11 @@ const PROFILE: BuildOption = BuildOption {
 };
 
 /// Every option, in the order of a text.
-pub(super) const OPTIONS: [BuildOption; 11] = [
+pub(super) const OPTIONS: [BuildOption; 12] = [
     PROFILE,
     choice!("arithmetic", arithmetic, PRECISIONS, true),
     choice!("hazards", hazards, HAZARDS, true),
+    number!("queue", queue, "DEPTH", queue, |depth| depth.to_string()),
     number!("window", window, "SLOTS", window, |slots| slots.to_string()),
     choice!("inertia", inertia, INERTIA, true),
     number!("bandwidth", bandwidth, "GBPS|unlimited", bandwidth, bandwidth_text),

@@ -24,6 +24,8 @@ fn a_build_is_written_as_it_is_read() {
         "half,f32,unchecked",
         "float,unchecked,world",
         "half,binary16,interlocked,window=64,isotropic",
+        "float,queue=64",
+        "float,interlocked,queue=0,window=9",
         "float,bandwidth=unlimited,length-width=14,address-width=32",
         "float,fence=0x40000000+512M",
         "float,bandwidth=17.07,threads=1,fast=off",
@@ -42,13 +44,14 @@ fn words_may_stand_in_any_order() {
 
 #[test]
 fn a_word_means_what_the_option_means() {
-    let text = "half,f32,unchecked,window=9,world,bandwidth=unlimited,\
+    let text = "half,f32,unchecked,queue=0,window=9,world,bandwidth=unlimited,\
                 length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
     let expected = Build {
         profile: Profile::by_name("half"),
         arithmetic: Some(Precision::F32),
         inertia: Some(Inertia::World),
         hazards: Some(Hazards::Unchecked),
+        queue: Some(0),
         window: Some(9),
         bandwidth: Some(Bandwidth::Unlimited),
         length_width: Some(14),
@@ -82,7 +85,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
             error.to_string(),
             format!(
                 "{:?} is no option of a build: give one of f32, binary16, \
-                 interlocked, unchecked, window=SLOTS, isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
+                 interlocked, unchecked, queue=DEPTH, window=SLOTS, isotropic, world, bandwidth=GBPS|unlimited, length-width=BITS, \
                  address-width=BITS, fence=BASE+BYTES, threads=N, fast=on|off",
                 text.split_once(',').expect("two words").1
             )
@@ -95,6 +98,7 @@ fn a_text_that_is_no_build_is_refused_with_the_known_words() {
     for (text, expected) in [
         ("float,window=0", "window=0: expected a whole number from 1 to 4294967295"),
         ("float,window=", "window=: expected a whole number from 1 to 4294967295"),
+        ("float,queue=257", "queue=257: expected a whole number from 0 to 256"),
         ("float,threads=0", "threads=0: expected a whole number from 1 to 31"),
         ("half,arithmetic=f64", "arithmetic=f64: expected f32 or binary16"),
     ] {
@@ -124,14 +128,16 @@ fn any_build() -> impl Strategy<Value = Build> {
         (any_of([Inertia::Isotropic, Inertia::World]), any_of([true, false])),
         any_of([Hazards::Interlocked, Hazards::Unchecked]),
         (prop::option::of(1..=u32::MAX), prop::option::of(rate), prop::option::of(1_usize..=31)),
+        prop::option::of(0_u32..=256),
         (prop::option::of(8_u32..=26), prop::option::of(32_u32..=64), any_of(fences)),
     )
-        .prop_map(|(profile, arithmetic, choices, hazards, numbers, widths)| Build {
+        .prop_map(|(profile, arithmetic, choices, hazards, numbers, queue, widths)| Build {
             profile: Some(profile),
             arithmetic,
             inertia: choices.0,
             fast: choices.1,
             hazards,
+            queue,
             window: numbers.0,
             bandwidth: numbers.1,
             threads: numbers.2,

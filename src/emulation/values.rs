@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use bitstream_model::{Bandwidth, Hazards, THREADS_MAX};
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
+use pgs_interface::control::QUEUE_MAX;
 use pgs_interface::fence::{Fence, NoFence};
 use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
@@ -32,6 +33,11 @@ pub(super) fn named<T: Copy>(table: &[Named<T>], text: &str) -> Result<T, String
 /// The name of a value, if it has one.
 pub(super) fn name_of<T: PartialEq>(table: &[Named<T>], value: &T) -> Option<&'static str> {
     table.iter().find(|(_, other)| other == value).map(|(name, _)| *name)
+}
+
+/// Reads the depth of an issue queue.
+pub(super) fn queue(text: &str) -> Result<u32, String> {
+    whole(text, 0, QUEUE_MAX)
 }
 
 /// Reads a number of issue slots.

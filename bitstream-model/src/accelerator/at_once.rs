@@ -48,34 +48,40 @@ impl Accelerator {
         }
     }
 
-    /// Computes a pass over all its collisions, which are right.
-    pub(crate) fn compute_pass(&mut self, pass: u32, collisions: &[Collision]) {
+    /// Computes a pass over all its collisions, which are right, in an order of their numbers.
+    pub(crate) fn compute_pass(&mut self, pass: u32, collisions: &[Collision], order: &[u32]) {
         if self.config.profile.flushes_subnormals {
-            self.compute_of::<SingleFlushed>(pass, collisions);
+            self.compute_of::<SingleFlushed>(pass, collisions, order);
         } else {
-            self.compute_of::<Single>(pass, collisions);
+            self.compute_of::<Single>(pass, collisions, order);
         }
     }
 
-    fn compute_of<S: Format>(&mut self, pass: u32, collisions: &[Collision]) {
+    fn compute_of<S: Format>(&mut self, pass: u32, collisions: &[Collision], order: &[u32]) {
         match (self.variant.numbers.updates, self.variant.inertia) {
             (Precision::Binary16, profile::Inertia::Isotropic) => {
-                self.compute_with::<Half, Isotropic>(pass, collisions);
+                self.compute_with::<Half, Isotropic>(pass, collisions, order);
             }
             (Precision::Binary16, profile::Inertia::World) => {
-                self.compute_with::<Half, World>(pass, collisions);
+                self.compute_with::<Half, World>(pass, collisions, order);
             }
             (Precision::F32, profile::Inertia::Isotropic) => {
-                self.compute_with::<S, Isotropic>(pass, collisions);
+                self.compute_with::<S, Isotropic>(pass, collisions, order);
             }
             (Precision::F32, profile::Inertia::World) => {
-                self.compute_with::<S, World>(pass, collisions);
+                self.compute_with::<S, World>(pass, collisions, order);
             }
         }
     }
 
-    fn compute_with<F: Format, I: Inertia>(&mut self, pass: u32, collisions: &[Collision]) {
-        for (index, collision) in collisions.iter().enumerate() {
+    fn compute_with<F: Format, I: Inertia>(
+        &mut self,
+        pass: u32,
+        collisions: &[Collision],
+        order: &[u32],
+    ) {
+        for index in order.iter().map(|number| *number as usize) {
+            let collision = &collisions[index];
             let (count, bodies) = collision.head();
             if count == 0 {
                 continue;

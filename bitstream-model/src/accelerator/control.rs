@@ -8,7 +8,7 @@ use pgs_interface::control::{
     ERROR_DETAIL, ErrorCode, FEATURES, FENCE_BASE, FENCE_SIZE, FLAGS, FRICTION, FRICTION_DEPTH,
     FRICTION_ITERATIONS, GIE, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS, IDENTIFICATION, IER,
     IMPULSE_SUM_HI, IMPULSE_SUM_LO, IMPULSE_SUM_MAX, ISR, ISSUE, MEMORY_BYTES, MEMORY_PER_RECORD,
-    MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, RESET, S2MM_WIDTHS,
+    MM2S_WIDTHS, NUMBERS, POSITION_COEFFICIENT, POSITION_DRIFT, PROFILE, QUEUE, RESET, S2MM_WIDTHS,
     SHAPE_CAPACITY, SHAPE_INVERSE_INERTIA, SHAPE_INVERSE_MASS, SHAPE_STRIDE, SHAPE_TABLE,
     SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, VERSION, WAIT_CYCLES, WORK_CYCLES, ap_ctrl,
     channels, depth, dma, error, features, flags, irq, issue, memory_per_record, numbers,
@@ -75,6 +75,8 @@ pub(crate) struct Arguments {
     pub(crate) warm_start: bool,
     /// Whether the impulses go out in front of the results.
     pub(crate) impulses_out: bool,
+    /// Whether the step passes by the issue queue.
+    pub(crate) in_order: bool,
     pub(crate) solver: SolverParameters,
     pub(crate) integration: Integration,
 }
@@ -215,6 +217,7 @@ impl Registers {
             streamed_masses: variant.has_streamed_masses() && flags::STREAMED_MASSES.is_set(set),
             warm_start: flags::WARM_START.is_set(set),
             impulses_out: flags::IMPULSES_OUT.is_set(set),
+            in_order: flags::IN_ORDER.is_set(set),
             solver: SolverParameters {
                 time_step,
                 drift: self.number(POSITION_DRIFT.offset),
@@ -340,6 +343,7 @@ impl Registers {
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
+            _ if offset == QUEUE.offset => config.queue_depth(),
             _ if offset == FENCE_BASE.offset => Fence::to_registers(config.fence)[0],
             _ if offset == FENCE_SIZE.offset => Fence::to_registers(config.fence)[1],
             _ if offset == ERROR.offset => self.error,

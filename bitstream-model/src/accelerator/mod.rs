@@ -1,7 +1,7 @@
 //! The emulated accelerator: beats in, beats out.
 //!
 //! ```text
-//! streams -> records/segment.rs -> records/decode.rs -> hazards.rs -> solver.rs -> velocities
+//! streams -> records/segment.rs -> records/decode.rs -> queue.rs, hazards.rs -> solver.rs -> velocities
 //!                                       integrate.rs -> records/results.rs -> streams
 //! ```
 //!
@@ -22,6 +22,7 @@ pub(crate) mod hazards;
 pub(crate) mod integrate;
 pub(crate) mod per_record;
 mod phases;
+pub(crate) mod queue;
 pub(crate) mod records;
 pub(crate) mod solver;
 pub(crate) mod state;
@@ -36,13 +37,14 @@ use crate::recording::{Stage, StageCounts, StageLog, StageSpan};
 use crate::stream::Stream;
 use crate::violation::{Log, ViolationKind};
 use pgs_interface::control::{
-    BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX,
+    BODIES, CONTACT_ITERATIONS, ErrorCode, FRICTION_ITERATIONS, ITERATIONS_MAX, NUMBERS_PER_BEAT,
 };
 use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use control::{Arguments, Counters, Registers, Request};
 use hazards::Pipeline;
+use queue::Queue;
 use records::decode::Collision;
 use records::results::Results;
 use records::segment::Segment;
@@ -97,6 +99,11 @@ pub(crate) struct Accelerator {
     debt: u64,
     pub(crate) counters: Counters,
     pub(crate) pipeline: Pipeline,
+    queue: Queue,
+    /// The records of the collisions in the queue, by their places.
+    queued: Vec<Collision>,
+    /// The numbers of collisions whose impulses went out, and which have not gone out themselves.
+    unsent: Vec<u32>,
     pub(crate) velocities: Vec<Velocity>,
     pub(crate) shape_of: Vec<u8>,
     /// With streamed masses, that of each body.
@@ -131,6 +138,9 @@ impl Accelerator {
                 profile.initiation_interval,
                 profile.collisions_per_issue,
             ),
+            queue: Queue::new(config.queue_depth()),
+            queued: Vec::new(),
+            unsent: Vec::new(),
             velocities: Vec::new(),
             shape_of: Vec::new(),
             inverse_masses: Vec::new(),
@@ -139,6 +149,26 @@ impl Accelerator {
             warm_issue: Vec::new(),
             stages: None,
         }
+    }
+
+    /// Whether the step goes through the issue queue.
+    pub(crate) fn is_queued(&self) -> bool {
+        self.config.queue_depth() > 0 && !self.arguments.in_order
+    }
+
+    /// Slots for which a collision in the issue queue occupies its bodies.
+    pub(crate) fn queue_window(&self) -> u64 {
+        let kinds = [self.variant.contact(), self.variant.friction()];
+        let [contact, friction] = kinds.map(|kind| self.config.depth(kind).window);
+        let interval = self.variant.profile.initiation_interval;
+        contact.max(friction).div_ceil(interval).max(1).into()
+    }
+
+    /// Beats of impulses that go out behind the last pass of a kind, with the numbers among them.
+    pub(crate) fn impulse_beats(&self) -> usize {
+        let collisions = self.arguments.collisions;
+        let numbers = if self.is_queued() { collisions.div_ceil(NUMBERS_PER_BEAT) } else { 0 };
+        collisions as usize + numbers as usize
     }
 
     fn busy(&self) -> bool {
@@ -486,6 +516,9 @@ impl Accelerator {
         self.impulses.clear();
         self.impulses.resize(collisions, [0.0; CONTACT_POINTS]);
         self.pipeline.start_step(bodies);
+        if self.is_queued() {
+            self.queue.start_step(bodies, self.queue_window());
+        }
         self.phase = Phase::Load(self.velocities_in());
     }
 }

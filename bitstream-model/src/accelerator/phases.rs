@@ -5,19 +5,21 @@ use std::ops::Range;
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, Single, SingleFlushed};
 use super::hazards::Entry;
+use super::queue::Waiting;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
 use super::records::results::Results;
 use super::records::segment::{Beats, PacketError, Reader, Segment};
 use super::records::striping::Striping;
+use super::state::Velocity;
 use super::{Accelerator, Phase};
 use crate::cast::register;
 use crate::config::Hazards;
 use crate::stream::Stream;
-use pgs_interface::control::ErrorCode;
+use pgs_interface::control::{ErrorCode, NUMBERS_PER_BEAT};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::{Depth, Inertia, Variant};
-use pgs_interface::record::{CONTACT_POINTS, collision, pose, result};
+use pgs_interface::record::{Beat, CONTACT_POINTS, collision, pose, result};
 use pgs_interface::stripe::IMPULSES_STREAM;
 
 /// Collisions of a pass that have arrived, and for how many cycles they may enter.
@@ -164,6 +166,8 @@ impl Accelerator {
             return;
         }
         self.pipeline.start_pass(self.depth(number).window.into());
+        self.queue.start_pass();
+        self.unsent.clear();
         self.phase = Phase::Pass { number, segment: self.collisions_in(number) };
     }
 
@@ -176,26 +180,32 @@ impl Accelerator {
         (inputs, outputs): (&mut [Stream], &mut [Stream]),
     ) -> Result<bool, PacketError> {
         let mut records = segment.available(inputs);
-        let arrived = records;
-        if self.arguments.sends_impulses(number) {
-            records = records.min(outputs[IMPULSES_STREAM].space());
-        }
-        if records < segment.left() {
-            // The collisions of an issue enter together.
-            records -= records % self.variant.profile.collisions_per_issue as usize;
-        }
-        if arrived == 0 {
+        if records == 0 {
             segment.check_waiting(inputs)?;
         }
-        if records == 0 {
-            return Ok(false);
+        let queued = self.is_queued();
+        if !queued {
+            if self.arguments.sends_impulses(number) {
+                records = records.min(outputs[IMPULSES_STREAM].space());
+            }
+            if records < segment.left() {
+                // The collisions of an issue enter together.
+                records -= records % self.variant.profile.collisions_per_issue as usize;
+            }
+            if records == 0 {
+                return Ok(false);
+            }
         }
         segment.check(records, inputs)?;
+        let before = segment.done;
         let input = PassInput { number, segment: &mut segment, records, limit, inputs, outputs };
         let cycles = self.solve_arrived(input)?;
+        if cycles == 0 && segment.done == before {
+            return Ok(false);
+        }
         self.debt += cycles;
         self.phase = Phase::Pass { number, segment };
-        if segment.finished() {
+        if segment.finished() && !(queued && self.queue.len() > 0) {
             if self.config.hazards == Hazards::Unchecked {
                 self.pipeline.finish_pass(&mut self.velocities);
             }
@@ -229,9 +239,11 @@ impl Accelerator {
         &mut self,
         input: PassInput<'_>,
     ) -> Result<u64, PacketError> {
-        match self.variant.inertia {
-            Inertia::Isotropic => self.solve_all::<R, U, Isotropic>(input),
-            Inertia::World => self.solve_all::<R, U, World>(input),
+        match (self.variant.inertia, self.is_queued()) {
+            (Inertia::Isotropic, false) => self.solve_all::<R, U, Isotropic>(input),
+            (Inertia::Isotropic, true) => self.solve_queued::<R, U, Isotropic>(input),
+            (Inertia::World, false) => self.solve_all::<R, U, World>(input),
+            (Inertia::World, true) => self.solve_queued::<R, U, World>(input),
         }
     }
 
@@ -297,6 +309,84 @@ impl Accelerator {
         }
     }
 
+    /// Lets collisions that have arrived enter the queue, and solves the ones that it issues, for
+    /// up to `limit` cycles; returns the cycles of these slots.
+    fn solve_queued<R: Format, U: Format, I: inertia::Inertia>(
+        &mut self,
+        input: PassInput<'_>,
+    ) -> Result<u64, PacketError> {
+        let PassInput { number, segment, records: arrived, limit, inputs, outputs } = input;
+        let sends = self.arguments.sends_impulses(number);
+        let interval = self.interval(number);
+        let (mut cycles, mut entered) = (0, 0);
+        let mut reader = (arrived > 0).then(|| segment.reader(0, inputs));
+        loop {
+            let left = segment.left() - entered;
+            let enters = left > 0 && !self.queue.is_full();
+            // A collision that takes the place of another one needs no slot of its own.
+            let takes_slot = !enters || self.queue.fills();
+            if takes_slot && cycles > limit {
+                break;
+            }
+            if enters {
+                let Some(reader) = reader.as_mut().filter(|_| entered < arrived) else { break };
+                self.enter(number, segment.done + entered, reader)?;
+                entered += 1;
+                cycles += if takes_slot { interval } else { 0 };
+                continue;
+            }
+            // Behind each group and behind the last one go the numbers.
+            let last = left == 0 && self.queue.len() == 1;
+            let closes = last || self.unsent.len() + 1 == NUMBERS_PER_BEAT as usize;
+            if sends && outputs[IMPULSES_STREAM].space() < 1 + usize::from(closes) {
+                break;
+            }
+            let Some(issued) = self.queue.issue() else { break };
+            self.counters.stalls += issued.idle * interval;
+            self.counters.hazards += u64::from(issued.hazard);
+            cycles += (issued.idle + 1) * interval;
+            let Waiting { number: which, place, .. } = issued.collision;
+            let (index, collision) = (which as usize, self.queued[place as usize]);
+            if let Some(entry) = self.entry_of(index, &collision)? {
+                let velocities = self.solved::<R, U, I>(number, index, &collision, &entry);
+                self.write_back(&entry, velocities);
+            }
+            if sends {
+                self.send_impulses(number, index, &collision, outputs);
+                self.unsent.push(which);
+                if closes {
+                    let numbers = std::mem::take(&mut self.unsent);
+                    self.send_beat(decode::numbers(&numbers), outputs);
+                }
+            }
+        }
+        let sum = segment.advance(entered, inputs);
+        self.received(sum);
+        Ok(cycles)
+    }
+
+    /// The next collision enters the queue.
+    fn enter(
+        &mut self,
+        pass: u32,
+        index: usize,
+        reader: &mut Reader<'_, impl Beats>,
+    ) -> Result<(), PacketError> {
+        let mut collision = self.collision(reader);
+        if self.arguments.is_warm(pass) {
+            let [impulses] = reader.rows();
+            collision = collision.with_impulses(self.variant.numbers.collisions, impulses);
+        }
+        let entry = self.entry_of(index, &collision)?;
+        let place = self.queue.enter(entry) as usize;
+        if place == self.queued.len() {
+            self.queued.push(collision);
+        } else {
+            self.queued[place] = collision;
+        }
+        Ok(())
+    }
+
     /// Sends the impulses of a collision after the last pass of its kind; zeros for padding.
     fn send_impulses(
         &mut self,
@@ -310,7 +400,11 @@ impl Accelerator {
             normal if pass < self.arguments.contact_passes() => normal,
             [_, first, second, _] => [first, second, 0.0, 0.0],
         };
-        let beat = decode::impulses(impulses);
+        self.send_beat(decode::impulses(impulses), outputs);
+    }
+
+    /// Sends a beat in front of the results.
+    fn send_beat(&mut self, beat: Beat, outputs: &mut [Stream]) {
         self.sent(beat.0.into_iter().fold(0, u32::wrapping_add));
         outputs[IMPULSES_STREAM].push(&[beat]);
     }
@@ -341,41 +435,60 @@ impl Accelerator {
         if unchecked {
             self.pipeline.retire_due(&mut self.velocities);
         }
-        if collision.count == 0 {
+        let Some(entry) = self.entry_of(index, collision)? else {
             if unchecked {
                 self.pipeline.issue_padding();
             }
             return Ok(0);
-        }
-        let (count, bodies) = collision.head();
-        let entry = self.checked(count, bodies).map_err(|code| PacketError {
-            code,
-            channel: 0,
-            beat: register(index),
-        })?;
-        let Entry { bodies, moving } = entry;
-        let sides = bodies.map(|body| body as usize);
-        let masses = sides.map(|body| self.mass_of(body));
+        };
         let stall = if unchecked { 0 } else { self.pipeline.wait(now, &entry) };
-
-        let mut velocities = [self.velocities[sides[0]], self.velocities[sides[1]]];
-        let mut impulses = self.impulses[index];
-        self.compute::<R, U, I>(pass, collision, &masses, &mut velocities, &mut impulses);
-        self.impulses[index] = impulses;
-
+        let velocities = self.solved::<R, U, I>(pass, index, collision, &entry);
         if unchecked {
             let stale = self.pipeline.issue(&entry, velocities);
             self.counters.hazards += u64::from(stale);
         } else {
-            for side in 0..2 {
-                if moving[side] {
-                    self.velocities[sides[side]] = velocities[side];
-                }
-            }
+            self.write_back(&entry, velocities);
             self.pipeline.entered(now + stall, &entry);
             self.counters.hazards += u64::from(stall > 0);
         }
         Ok(stall)
+    }
+
+    /// The bodies of a collision that comes in and which of them move; `None` of padding.
+    #[inline]
+    fn entry_of(&self, index: usize, collision: &Collision) -> Result<Option<Entry>, PacketError> {
+        let (count, bodies) = collision.head();
+        if count == 0 {
+            return Ok(None);
+        }
+        let wrong = |code| PacketError { code, channel: 0, beat: register(index) };
+        self.checked(count, bodies).map(Some).map_err(wrong)
+    }
+
+    /// The velocities that a collision writes back; its impulses are those after the pass.
+    #[inline]
+    fn solved<R: Format, U: Format, I: inertia::Inertia>(
+        &mut self,
+        pass: u32,
+        index: usize,
+        collision: &Collision,
+        entry: &Entry,
+    ) -> [Velocity; 2] {
+        let sides = entry.bodies.map(|body| body as usize);
+        let masses = sides.map(|body| self.mass_of(body));
+        let mut velocities = sides.map(|body| self.velocities[body]);
+        let mut impulses = self.impulses[index];
+        self.compute::<R, U, I>(pass, collision, &masses, &mut velocities, &mut impulses);
+        self.impulses[index] = impulses;
+        velocities
+    }
+
+    fn write_back(&mut self, entry: &Entry, velocities: [Velocity; 2]) {
+        for ((body, moves), velocity) in entry.bodies.iter().zip(entry.moving).zip(velocities) {
+            if moves {
+                self.velocities[*body as usize] = velocity;
+            }
+        }
     }
 
     /// The bodies of a collision and which of them move, or the reason to refuse it.

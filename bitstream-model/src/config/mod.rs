@@ -10,7 +10,7 @@ use self::quirks::Quirks;
 use pgs_interface::address_map::CONTROL_BYTES;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
-use pgs_interface::control::{SHAPE_STRIDE, SHAPE_TABLE};
+use pgs_interface::control::{QUEUE_MAX, SHAPE_STRIDE, SHAPE_TABLE};
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{Depth, FLOAT, Inertia, Profile, Variant};
@@ -109,6 +109,9 @@ pub struct BoardConfig {
     pub inertia: Inertia,
     /// Behaviour on read-after-write hazards.
     pub hazards: Hazards,
+    /// Depth of the issue queue in collisions, 0 for none, instead of the profile's. Only an
+    /// interlocked design of which [`Profile::queue`] knows can have one.
+    pub queue: Option<u32>,
     /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
     pub window_slots: Option<u32>,
     /// Memory bandwidth.
@@ -147,6 +150,7 @@ impl Default for BoardConfig {
             numbers: None,
             inertia: Inertia::Isotropic,
             hazards: Hazards::Interlocked,
+            queue: None,
             window_slots: None,
             bandwidth: Bandwidth::ZCU102_SUSTAINED,
             length_width: LENGTH_WIDTH_MAX,
@@ -198,6 +202,19 @@ pub enum ConfigError {
          in f32, or both in binary16"
     )]
     RowsBeyondUpdates,
+    /// An issue queue in a design that has none.
+    #[error(
+        "expected no issue queue in {hazards} {profile}, found one of {found} collisions: take an \
+         interlocked float, or queue=0"
+    )]
+    NoQueue {
+        /// The treatment of hazards.
+        hazards: &'static str,
+        /// Name of the profile.
+        profile: &'static str,
+        /// The requested depth.
+        found: u32,
+    },
     /// A profile of the caller's own that contradicts itself.
     #[error("profile {name:?}: {what}")]
     Profile {
@@ -229,6 +246,16 @@ impl BoardConfig {
             numbers: self.numbers.unwrap_or(self.profile.numbers),
             inertia: self.inertia,
         }
+    }
+
+    /// Depth of the issue queue, collisions; 0: there is none.
+    #[must_use]
+    pub fn queue_depth(&self) -> u32 {
+        let of_profile = match self.hazards {
+            Hazards::Interlocked => self.profile.queue,
+            Hazards::Unchecked => None,
+        };
+        self.queue.or(of_profile).unwrap_or(0)
     }
 
     /// Depth of one kind of pass on this board: a pass ends no sooner than its last write-back.
@@ -264,6 +291,16 @@ impl BoardConfig {
         check_profile(self.profile)?;
         self.check_numbers()?;
         self.check_sizes(range)?;
+        let queue = self.queue_depth();
+        range("depth of the issue queue in collisions", queue.into(), 0, QUEUE_MAX.into())?;
+        let (has, hazards) = match self.hazards {
+            Hazards::Interlocked => (self.profile.has_queue(), "an interlocked"),
+            Hazards::Unchecked => (false, "an unchecked"),
+        };
+        if queue > 0 && !has {
+            let profile = self.profile.name;
+            return Err(ConfigError::NoQueue { hazards, profile, found: queue });
+        }
         range("address width", self.address_width.into(), 32, 64)?;
         // The capability register carries the window in cycles in 16 bits.
         let slots_max = u64::from(u16::MAX) / u64::from(self.profile.initiation_interval);

@@ -1,13 +1,14 @@
-//! Assigns each collision to a block: the first with an empty lane behind all earlier collisions of
-//! its moving bodies.
+//! Assigns each collision to a block, in the order of issue: the first with an empty lane behind all
+//! earlier collisions of its moving bodies.
 //!
-//! So the collisions of a body lie in different blocks in the order in which they came, and taking
+//! So the collisions of a body lie in different blocks in the order in which they issue, and taking
 //! block after block gives the bits of taking collision after collision. In hazard-free order the
 //! blocks are full and the order is the one received.
 
 use pgs_support::lanes::LANES;
 
 use super::block::{NONE, Words};
+use crate::accelerator::hazards::Entry;
 use crate::cast::register;
 
 /// Empty lanes allowed in addition to one for every two collisions; where a scene needs more, one
@@ -28,7 +29,7 @@ struct Used {
 pub(super) struct Groups {
     /// The collisions of each block, by lanes.
     pub(super) members: Vec<Words<u32>>,
-    /// Block and lane of each collision; [`NONE`] of padding.
+    /// Block and lane of each collision as they issue; [`NONE`] of padding.
     pub(super) slots: Vec<u32>,
     used: Vec<Used>,
     taken: Vec<u8>,
@@ -50,13 +51,10 @@ impl Groups {
         *collisions = 0;
     }
 
-    /// Places a padding entry, which is in no block.
-    pub(super) fn pad(&mut self) {
-        self.slots.push(NONE);
-    }
-
-    /// Places the next collision.
-    pub(super) fn place(&mut self, bodies: [u32; 2], moving: [bool; 2]) {
+    /// Places the next collision that issues, or padding.
+    #[inline]
+    pub(super) fn place(&mut self, number: u32, entry: Option<Entry>) {
+        let Some(Entry { bodies, moving }) = entry else { return self.slots.push(NONE) };
         let mut from = 0;
         for (body, moves) in bodies.into_iter().zip(moving) {
             if moves {
@@ -70,7 +68,7 @@ impl Groups {
             self.next.push(register(block));
         }
         let lane = self.taken[block];
-        self.members[block][usize::from(lane)] = register(self.slots.len());
+        self.members[block][usize::from(lane)] = number;
         self.slots.push(register(block * LANES) + u32::from(lane));
         self.taken[block] += 1;
         if usize::from(lane) + 1 == LANES {

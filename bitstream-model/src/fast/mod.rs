@@ -3,6 +3,7 @@
 mod block;
 mod fronts;
 mod groups;
+mod order;
 mod read;
 mod solve;
 mod time;
@@ -98,6 +99,7 @@ pub(crate) struct Fast {
     entries: Vec<Option<Entry>>,
     /// In the way of one collision after the other: the collisions of each kind of pass.
     collisions: [Vec<Collision>; read::KINDS],
+    order: order::Order,
     lanes: solve::Lanes,
     results: [Vec<Beat>; STREAMS_MAX],
 }
@@ -132,6 +134,7 @@ impl Fast {
             passing: Stream::unread(),
             entries: Vec::new(),
             collisions: Default::default(),
+            order: order::Order::new(config.queue_depth()),
             lanes: solve::Lanes::default(),
             results: Default::default(),
         })
@@ -279,15 +282,28 @@ impl Fast {
         let none = [0; STREAMS_MAX];
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
-        let (bodies, collisions) = (accelerator.velocities.len(), self.entries.len());
+        let bodies = accelerator.velocities.len();
         let together = profile.collisions_per_issue as usize;
-        let issues = self.issues(collisions) as u64;
+        let issues = self.issues(self.entries.len()) as u64;
         let mut counters = accelerator.counters;
         self.counted.clear();
         for pass in 0..accelerator.arguments.passes() {
             let segment = accelerator.collisions_in(pass);
             let depth = accelerator.depth(pass);
             let interval = accelerator.interval(pass);
+            let mut writes = none;
+            if accelerator.arguments.sends_impulses(pass) {
+                writes[IMPULSES_STREAM] = accelerator.impulse_beats();
+            }
+            let (reads, fill) = (segment.array().packets, u64::from(depth.fill));
+            if let Some(slots) = self.order.slots() {
+                counters.stalls += slots.idle * interval;
+                counters.hazards += slots.hazards;
+                let work = (slots.all - slots.draining) * interval;
+                let fill = slots.draining * interval + fill;
+                parts.push(Part { reads, writes, work, fill });
+                continue;
+            }
             let of = (u64::from(depth.window), interval);
             let known =
                 self.counted.iter().find(|(kind, _)| *kind == of).map(|(_, stalls)| *stalls);
@@ -300,13 +316,8 @@ impl Fast {
             }
             counters.stalls += found.cycles;
             counters.hazards += found.collisions;
-            let mut writes = none;
-            if accelerator.arguments.sends_impulses(pass) {
-                writes[IMPULSES_STREAM] = collisions;
-            }
             let work = issues * interval + found.cycles;
-            let reads = segment.array().packets;
-            parts.push(Part { reads, writes, work, fill: depth.fill.into() });
+            parts.push(Part { reads, writes, work, fill });
         }
         let (poses, results) = (accelerator.poses_in(), accelerator.results_out());
         let cycles = |array: &crate::accelerator::records::array::Array| array.cycles(bodies);
@@ -328,6 +339,6 @@ fn outgoing(accelerator: &Accelerator) -> PerStream {
     let mut beats = accelerator.results_out().array().packets;
     let arguments = &accelerator.arguments;
     let sends = (0..arguments.passes()).filter(|pass| arguments.sends_impulses(*pass)).count();
-    beats[IMPULSES_STREAM] += sends * arguments.collisions as usize;
+    beats[IMPULSES_STREAM] += sends * accelerator.impulse_beats();
     beats
 }

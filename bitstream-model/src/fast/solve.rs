@@ -11,13 +11,15 @@ use super::block::{
 };
 use super::fronts::Fronts;
 use super::groups::Groups;
+use super::order::Order;
 use super::read::{COLD, Collisions, Input, KINDS, Views, kind};
 use super::{Fast, Plan};
 use crate::accelerator::Accelerator;
-use crate::accelerator::hazards::Entry;
 use crate::accelerator::records::decode::{self, Collision};
 use crate::accelerator::records::segment::Reader;
+use crate::accelerator::solver::Impulses;
 use crate::accelerator::state::Velocity;
+use pgs_interface::control::NUMBERS_PER_BEAT;
 use pgs_interface::number::Numbers;
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::{Beat, CONTACT_POINTS, collision};
@@ -47,10 +49,11 @@ impl Fast {
         input: &Input<'a>,
     ) -> Option<Option<Collisions<'a>>> {
         let count = accelerator.arguments.collisions as usize;
-        self.entries.clear();
+        let Self { entries, order, lanes: Lanes { groups, .. }, .. } = self;
+        entries.clear();
+        order.begin(accelerator);
         if accelerator.variant.numbers == Numbers::F32 {
             let records = Collisions::new(accelerator, input)?;
-            let groups = &mut self.lanes.groups;
             groups.begin(accelerator.velocities.len());
             let friction = accelerator.arguments.solver.pair_friction;
             let ignored = if friction { collision::FRICTION_BITS } else { 0 };
@@ -59,16 +62,19 @@ impl Fast {
                 let rows = [collision::BODY_A, collision::BODY_B];
                 let bodies = rows.map(|row| records.word(at, row));
                 let entry = accelerator.entry(head as usize, bodies)?;
-                self.entries.push(entry);
-                match entry {
-                    Some(Entry { bodies, moving }) => groups.place(bodies, moving),
-                    None => groups.pad(),
+                entries.push(entry);
+                if let Some(number) = order.enter(entry) {
+                    groups.place(number, entries[number as usize]);
                 }
+            }
+            while let Some(number) = order.leave() {
+                groups.place(number, entries[number as usize]);
             }
             if !groups.wasteful() {
                 return Some(Some(records));
             }
-            self.entries.clear();
+            entries.clear();
+            order.begin(accelerator);
         }
         for number in 0..KINDS {
             self.collisions[number].clear();
@@ -90,8 +96,11 @@ impl Fast {
         kinds.all(|others| others.iter().zip(first).all(same)).then_some(())?;
         for collision in first {
             let (count, bodies) = collision.head();
-            self.entries.push(accelerator.entry(count, bodies)?);
+            let entry = accelerator.entry(count, bodies)?;
+            entries.push(entry);
+            order.enter(entry);
         }
+        while order.leave().is_some() {}
         Some(None)
     }
 
@@ -100,15 +109,15 @@ impl Fast {
         let mut sent = 0;
         let before = accelerator.counters.impulse_sum;
         for pass in 0..plan.passes {
-            accelerator.compute_pass(pass, &self.collisions[kind(accelerator, pass)]);
+            let collisions = &self.collisions[kind(accelerator, pass)];
+            accelerator.compute_pass(pass, collisions, &self.order.numbers);
             if accelerator.arguments.sends_impulses(pass) {
-                let impulses = &accelerator.impulses;
-                for (entry, impulses) in self.entries.iter().zip(impulses) {
-                    let impulses = if entry.is_some() { *impulses } else { [0.0; CONTACT_POINTS] };
-                    let beat = outgoing(pass < plan.contact, impulses);
-                    self.results[IMPULSES_STREAM][sent] = beat;
-                    sent += 1;
-                }
+                let impulses = |_, number| match self.entries[number] {
+                    Some(_) => accelerator.impulses[number],
+                    None => [0.0; CONTACT_POINTS],
+                };
+                let to = &mut self.results[IMPULSES_STREAM][sent..];
+                sent += send(&self.order, pass < plan.contact, impulses, to);
             }
         }
         std::mem::replace(&mut accelerator.counters.impulse_sum, before)
@@ -122,7 +131,7 @@ impl Fast {
         records: &Collisions<'_>,
         plan: Plan,
     ) -> Option<u64> {
-        let Self { lanes, crew, results, .. } = self;
+        let Self { lanes, crew, results, order, .. } = self;
         let Lanes { groups, blocks, spins, given, bodies, inertias, fronts } = lanes;
         bodies.clear();
         bodies.resize(ROWS_APART as usize, BodyRow::default());
@@ -188,8 +197,8 @@ impl Fast {
             subnormal |= solved.subnormal;
             first = *end;
             if accelerator.arguments.impulses_out {
-                for slot in &groups.slots {
-                    let impulses = match *slot {
+                let impulses = |issue: usize, _| {
+                    let impulses = match groups.slots[issue] {
                         NONE => [0.0; CONTACT_POINTS],
                         slot => {
                             let slot = slot as usize;
@@ -197,9 +206,10 @@ impl Fast {
                         }
                     };
                     subnormal |= plan.watches && impulses.into_iter().any(f32::is_subnormal);
-                    results[IMPULSES_STREAM][sent] = outgoing(*end <= plan.contact, impulses);
-                    sent += 1;
-                }
+                    impulses
+                };
+                let to = &mut results[IMPULSES_STREAM][sent..];
+                sent += send(order, *end <= plan.contact, impulses, to);
             }
         }
         let own = &bodies[ROWS_APART as usize..];
@@ -253,6 +263,33 @@ impl Fast {
         });
         sum.into_inner()
     }
+}
+
+/// Sends the impulses behind the last pass of a kind in the order of issue, from the place in this
+/// order and the number of each collision, and in a step through the queue the numbers behind each
+/// group; returns the number of beats.
+fn send(
+    order: &Order,
+    contact: bool,
+    mut impulses: impl FnMut(usize, usize) -> Impulses,
+    to: &mut [Beat],
+) -> usize {
+    let mut sent = 0;
+    let mut push = |beat| {
+        to[sent] = beat;
+        sent += 1;
+    };
+    let queued = order.slots().is_some();
+    for (group, numbers) in order.numbers.chunks(NUMBERS_PER_BEAT as usize).enumerate() {
+        for (at, number) in numbers.iter().enumerate() {
+            let issue = group * NUMBERS_PER_BEAT as usize + at;
+            push(outgoing(contact, impulses(issue, *number as usize)));
+        }
+        if queued {
+            push(decode::numbers(numbers));
+        }
+    }
+    sent
 }
 
 /// The beat of a collision's impulses behind the last pass of a kind.

@@ -1,7 +1,7 @@
 //! The clock cycles of a step without its beats: a segment takes as long as the larger of its work
 //! and its transfer.
 //!
-//! While a pass drains its pipeline, and while it works longer than its transfer takes, the next
+//! While a pass empties its issue queue and drains its pipeline, and while it works longer than its transfer takes, the next
 //! segment's beats fill the FIFOs. The same collisions come in every pass of a kind, so stalls are
 //! counted once for each kind.
 
@@ -14,9 +14,9 @@ use crate::arbiter::Arbiter;
 pub(super) struct Part {
     pub(super) reads: PerStream,
     pub(super) writes: PerStream,
-    /// Cycles of its records, stalls included.
+    /// Cycles in which its records are taken, stalls included.
     pub(super) work: u64,
-    /// Cycles in which nothing is taken behind them.
+    /// Cycles behind them in which nothing is taken: an issue queue empties, a pipeline drains.
     pub(super) fill: u64,
 }
 

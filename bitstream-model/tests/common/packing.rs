@@ -2,6 +2,7 @@
 //! stripes, padding, written from the interface's tables.
 
 use half::f16;
+use pgs_interface::control::NUMBERS_PER_BEAT;
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::{BEAT_BYTES, Beat, collision, result};
@@ -172,7 +173,7 @@ impl Step {
             slowest(&beats, profile.mm2s_widths)
         };
         let results = Step { impulses_out: false, ..self.clone() };
-        let results = slowest(&beats_out(variant, &results), profile.s2mm_widths);
+        let results = slowest(&beats_out(variant, &results, false), profile.s2mm_widths);
         let collisions = self.collisions.len() as u64;
         let issues = collisions.div_ceil(profile.collisions_per_issue.into());
         let pass = issues * u64::from(profile.initiation_interval);
@@ -215,17 +216,34 @@ fn slowest(beats: &[usize], widths: &[u32]) -> u64 {
     cycles.max().expect("a profile has streams")
 }
 
-/// Beats of impulses that go out on the first stream.
-pub(crate) fn impulse_beats(step: &Step) -> usize {
+/// Beats of impulses that go out on the first stream; through the issue queue with the numbers of
+/// their collisions.
+pub(crate) fn impulse_beats(step: &Step, queued: bool) -> usize {
     let kinds = step.iterations.into_iter().filter(|passes| *passes > 0).count();
-    if step.impulses_out { kinds * step.collisions.len() } else { 0 }
+    let collisions = step.collisions.len();
+    let numbers = if queued { collisions.div_ceil(NUMBERS_PER_BEAT as usize) } else { 0 };
+    if step.impulses_out { kinds * (collisions + numbers) } else { 0 }
 }
 
 /// Beats on each stream that a step gives out.
-pub(crate) fn beats_out(variant: &Variant, step: &Step) -> Vec<usize> {
+pub(crate) fn beats_out(variant: &Variant, step: &Step, queued: bool) -> Vec<usize> {
     let mut beats = result_beats(variant, step.bodies.len());
-    beats[0] += impulse_beats(step);
+    beats[0] += impulse_beats(step, queued);
     beats
+}
+
+/// The numbers of the collisions and their impulses as a kind's beats have them, in order of issue.
+pub(crate) fn numbered(beats: &[Beat], collisions: usize) -> Vec<(u32, Beat)> {
+    let of_group = NUMBERS_PER_BEAT as usize;
+    let mut all = Vec::new();
+    for group in beats.chunks(of_group + 1) {
+        let (numbers, impulses) = group.split_last().expect("a chunk is not empty");
+        let (own, beyond) = numbers.0.split_at(impulses.len());
+        assert!(beyond.iter().all(|number| *number == 0), "words beyond the last are 0");
+        all.extend(own.iter().copied().zip(impulses.iter().copied()));
+    }
+    assert_eq!(all.len(), collisions);
+    all
 }
 
 /// Result beats on each stream.

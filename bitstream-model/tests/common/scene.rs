@@ -1,5 +1,6 @@
 //! A step's input and output as plain numbers.
 
+use bitstream_model::BoardConfig;
 use pgs_interface::control::{self, flags};
 use pgs_interface::profile::{FLOAT, Variant};
 use pgs_interface::record::Beat;
@@ -55,6 +56,8 @@ pub(crate) struct Step {
     /// without any there is none.
     pub(crate) impulses: Vec<[[f32; 4]; 2]>,
     pub(crate) impulses_out: bool,
+    /// Whether it passes by an issue queue.
+    pub(crate) in_order: bool,
     /// The inverse mass that each body brings with its world inertia; without any, all have their
     /// shape's.
     pub(crate) masses: Vec<f32>,
@@ -80,6 +83,7 @@ impl Step {
             frictions: Vec::new(),
             impulses: Vec::new(),
             impulses_out: false,
+            in_order: false,
             masses: Vec::new(),
             iterations: [4, 4],
             integrate: true,
@@ -134,6 +138,11 @@ impl Step {
         Self::new(all, collisions)
     }
 
+    /// Whether it goes through the issue queue of a board.
+    pub(crate) fn is_queued(&self, config: &BoardConfig) -> bool {
+        config.queue_depth() > 0 && !self.in_order
+    }
+
     /// Writes the arguments and the shape table.
     pub(crate) fn write_arguments(&self, host: &Host) {
         let number = |length: usize| u32::try_from(length).expect("the tests' steps are small");
@@ -146,6 +155,7 @@ impl Step {
         let word = flags::WARM_START.put(word, (!self.impulses.is_empty()).into());
         let word = flags::STREAMED_MASSES.put(word, (!self.masses.is_empty()).into());
         let word = flags::IMPULSES_OUT.put(word, self.impulses_out.into());
+        let word = flags::IN_ORDER.put(word, self.in_order.into());
         host.set_control(control::FLAGS, word);
         let [x, y, z] = self.gravity;
         for (register, value) in [

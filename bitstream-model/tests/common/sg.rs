@@ -278,7 +278,8 @@ impl Machine {
     pub(crate) fn begin(&mut self, step: &Step, lanes: &[Lane]) -> Flight {
         step.write_arguments(&self.host);
         let mut flight = Flight::default();
-        let beats = beats_out(&self.host.variant(), step);
+        let queued = step.is_queued(&self.host.board.config());
+        let beats = beats_out(&self.host.variant(), step, queued);
         self.arm(&mut flight, &beats);
         self.start();
         self.send(&mut flight, lanes);

@@ -79,12 +79,16 @@ fn config() -> impl Strategy<Value = BoardConfig> {
         ),
         prop::option::of(prop::sample::select(&[1_u32, 3, 20, 600][..])),
         prop::sample::select(&[Inertia::Isotropic, Inertia::World][..]),
+        prop::sample::select(&[0_u32, 1, 2, 7, 64, 256][..]),
     )
-        .prop_map(|(profile, fifo_beats, length_width, bandwidth, window_slots, inertia)| {
-            let usual = board(profile, fifo_beats);
-            let inertia = profile.world.map_or(Inertia::Isotropic, |_| inertia);
-            BoardConfig { length_width, bandwidth, window_slots, inertia, ..usual }
-        })
+        .prop_map(
+            |(profile, fifo_beats, length_width, bandwidth, window_slots, inertia, queue)| {
+                let usual = board(profile, fifo_beats);
+                let inertia = profile.world.map_or(Inertia::Isotropic, |_| inertia);
+                let queue = profile.queue.map(|_| queue);
+                BoardConfig { length_width, bandwidth, window_slots, inertia, queue, ..usual }
+            },
+        )
 }
 
 /// A board that goes on after a violation.
@@ -105,10 +109,11 @@ proptest! {
         config in config(),
         (bodies, collisions, seed, apart) in (9..400_u32, 0..900_u32, any::<u64>(), any::<bool>()),
         iterations in prop::sample::select(&[[4, 4], [1, 2], [0, 3], [2, 0], [1, 1]][..]),
-        (integrate, extensions) in (prop::bool::weighted(0.8), 0..16_u8),
+        (integrate, in_order, extensions) in
+            (prop::bool::weighted(0.8), prop::bool::weighted(0.2), 0..16_u8),
         spoilt in prop::option::weighted(0.2, (any::<u64>(), 0..5_u32)),
     ) {
-        let step = Step { integrate, ..scene(bodies, collisions, seed, apart) };
+        let step = Step { integrate, in_order, ..scene(bodies, collisions, seed, apart) };
         let mut step = extended(step, extensions, seed, config.profile);
         step.iterations = iterations;
         if let Some((at, how)) = spoilt.filter(|_| collisions > 0) {
@@ -122,7 +127,11 @@ proptest! {
             }
         }
         let passes = iterations[0] + iterations[1] + 2;
-        same(config, 2, tolerance(&config, passes), |machine| machine.step(&step));
+        let tolerance = match tolerance(&config, passes) {
+            Tolerance::Limited { slices } if step.is_queued(&config) => Tolerance::Queued { slices },
+            tolerance => tolerance,
+        };
+        same(config, 2, tolerance, |machine| machine.step(&step));
     }
 }
 
@@ -132,10 +141,11 @@ fn a_host_that_waits_for_a_whole_step_has_it_taken_at_once() {
         .iter()
         .flat_map(|profile| profile.inertias().iter().map(|inertia| (*profile, *inertia)))
     {
+        let queue = profile.queue.map(|_| 64);
         for extensions in 0..16 {
             let step = extended(scene(400, 800, 7, true), extensions, 7, profile);
             for length_width in [14, 26] {
-                let config = BoardConfig { length_width, inertia, ..board(profile, 512) };
+                let config = BoardConfig { length_width, inertia, queue, ..board(profile, 512) };
                 let found = counted(|| {
                     let mut machine = Machine::with_slots(config, SLOTS);
                     for _ in 0..2 {

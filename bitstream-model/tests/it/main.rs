@@ -15,6 +15,7 @@ mod float_environment;
 mod formats;
 mod profiles;
 mod properties;
+mod queue;
 mod quirks;
 mod recording;
 mod registers;

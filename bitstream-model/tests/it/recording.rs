@@ -277,7 +277,7 @@ fn take_late(late: bool, step: &Step) -> Recording {
     step.write_arguments(&machine.host);
     let variant = machine.host.variant();
     let mut flight = Flight::default();
-    machine.arm(&mut flight, &beats_out(&variant, step));
+    machine.arm(&mut flight, &beats_out(&variant, step, false));
     machine.start();
     machine.send(&mut flight, &step.packed(&variant));
     machine.host.port.pause(microseconds(3));

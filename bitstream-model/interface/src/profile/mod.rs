@@ -85,6 +85,9 @@ pub struct Profile {
     /// Collisions that enter the pipeline together. A last issue that is not full is filled up with
     /// padding collisions.
     pub collisions_per_issue: u32,
+    /// Depth of the issue queue of an interlocked build in collisions, unless it was built with
+    /// another one; 0: it has none. `None`: no build has one.
+    pub queue: Option<u32>,
     /// Contact pipeline with isotropic inertia; [`Variant::contact`] has the one of a build.
     pub contact: Depth,
     /// Friction pipeline with isotropic inertia.
@@ -121,6 +124,12 @@ impl Profile {
     #[must_use]
     pub fn by_id(id: u32) -> Option<&'static Self> {
         PROFILES.iter().copied().find(|profile| profile.id == id)
+    }
+
+    /// Whether an interlocked build can have an issue queue: collisions leave it one by one.
+    #[must_use]
+    pub const fn has_queue(&self) -> bool {
+        self.queue.is_some() && self.collisions_per_issue == 1
     }
 
     /// The forms of inertia with which it can be built.

@@ -6,8 +6,11 @@
 use super::array::Row;
 use crate::accelerator::arithmetic::sixteen;
 use crate::accelerator::state::{Pose, Velocity};
+use pgs_interface::control::NUMBERS_PER_BEAT;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::record::{Beat, CONTACT_POINTS, WORD_LANE, collision, pose, result, velocity};
+use pgs_interface::record::{
+    Beat, CONTACT_POINTS, LANES, WORD_LANE, collision, pose, result, velocity,
+};
 
 /// The number in a word of a format.
 #[inline(always)]
@@ -98,6 +101,16 @@ impl Collision {
 /// The beat of a collision's impulses.
 pub(crate) fn impulses(impulses: [f32; CONTACT_POINTS]) -> Beat {
     Beat(impulses.map(|impulse| word(StreamFormat::F32, impulse)))
+}
+
+/// The beat of the numbers of up to four collisions whose impulses went out.
+pub(crate) fn numbers(collisions: &[u32]) -> Beat {
+    const _: () = assert!(NUMBERS_PER_BEAT as usize == LANES);
+    let mut beat = Beat::default();
+    for (word, number) in beat.0.iter_mut().zip(collisions) {
+        *word = *number;
+    }
+    beat
 }
 
 /// The friction above a contact count.

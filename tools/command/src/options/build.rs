@@ -26,6 +26,10 @@ pub struct BuildArgs {
     /// On a hazard, wait for the velocity or read the stale one [default: interlocked]
     #[arg(long, value_parser = choice("hazards", |build| build.hazards))]
     hazards: Option<Hazards>,
+    /// Collisions that wait in the issue queue, 0 for no queue; only an interlocked float has one
+    /// [default: the profile's]
+    #[arg(long, value_name = "DEPTH", value_parser = number("queue", |build| build.queue))]
+    queue: Option<u32>,
     /// Hazard window in issue slots [default: the profile's]
     #[arg(long, value_name = "SLOTS", value_parser = number("window", |build| build.window))]
     window: Option<u32>,
@@ -70,6 +74,7 @@ impl BuildArgs {
             arithmetic: self.arithmetic,
             inertia: self.inertia,
             hazards: self.hazards,
+            queue: self.queue,
             window: self.window,
             bandwidth: self.bandwidth,
             length_width: self.length_width,
@@ -154,7 +159,7 @@ mod tests {
 
     #[test]
     fn each_option_of_the_command_line_is_that_of_a_text() {
-        let text = "half,f32,unchecked,window=9,world,bandwidth=unlimited,\
+        let text = "half,f32,unchecked,queue=0,window=9,world,bandwidth=unlimited,\
                     length-width=14,address-width=32,fence=0x50000000+64M,threads=3,fast=off";
         let expected: Build = text.parse().expect("a build");
         let options = Build::keys()

@@ -42,7 +42,7 @@ Examples with the Verilog in simulation (docs/bitstream.md):
 
 A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
 change is a word: f32, binary16 (arithmetic), interlocked, unchecked, isotropic, world; or \
-window=SLOTS,
+queue=DEPTH, window=SLOTS,
 bandwidth=GBPS, length-width=BITS, address-width=BITS, threads=N and
 fast=on|off. The order of a board's collisions is one of auto, as-given, hazard-free,
 hazard-free-nearby, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
