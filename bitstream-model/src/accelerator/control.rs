@@ -361,8 +361,6 @@ impl Registers {
             _ if offset == IMPULSE_SUM_LO.offset => low(counters.impulse_sum),
             _ if offset == IMPULSE_SUM_HI.offset => high(counters.impulse_sum),
             _ if offset == RESET.offset => u32::from(resetting),
-            // No design has an issue queue yet.
-            _ if offset == pgs_interface::control::QUEUE.offset => 0,
             _ => return None,
         })
     }
