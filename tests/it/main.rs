@@ -24,6 +24,7 @@ mod overlap;
 mod pack_threads;
 mod prepared;
 mod profiles;
+mod queue;
 mod refusals;
 mod served;
 mod shapes;
