@@ -22,6 +22,7 @@ mod landing;
 mod order;
 mod overlap;
 mod pack_threads;
+mod places;
 mod prepared;
 mod profiles;
 mod queue;
