@@ -6,7 +6,7 @@
 
 use pgs_interface::record::Beat;
 
-use crate::beat::unpack::results::sum_of_words;
+use crate::beat::deal::sum_of_words;
 use crate::board::plan::{NUMBERS_PER_BEAT, Plan};
 use crate::fault::Fault;
 use crate::scene::Impulses;
