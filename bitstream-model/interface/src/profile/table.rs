@@ -105,19 +105,13 @@ pub const HALF: Profile = Profile {
         Stripe { streams: &[0, 0, 1, 1, 2], padded: true },
     )
     .with_warm_collisions(Stripe { streams: &[0, 0, 0, 1, 1, 1, 2, 2], padded: true }),
-    queue: None,
     initiation_interval: 3,
     collisions_per_issue: 2,
-    contact: CONTACT,
-    friction: FRICTION,
-    world: None,
-    integration_fill: INTEGRATION_FILL,
-    flushes_subnormals: false,
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },
-    body_capacity: 131_072,
-    shape_capacity: 64,
     source: "thesis §5.5, §4.4.2",
+    // The pipelines, no queue, the capacities, and that subnormal numbers count.
+    ..NAIVE
 };
 
 /// Every profile.
