@@ -50,9 +50,9 @@ pub const NAIVE: Profile = Profile {
         Stripe { streams: &[0], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0], padded: false }),
+    queue: None,
     initiation_interval: 28,
     collisions_per_issue: 1,
-    queue: None,
     contact: CONTACT,
     friction: FRICTION,
     world: None,
@@ -77,9 +77,9 @@ pub const FLOAT: Profile = Profile {
         Stripe { streams: &[0, 1, 2, 3], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
+    queue: Some(0),
     initiation_interval: 2,
     collisions_per_issue: 1,
-    queue: Some(0),
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
     world: Some([FLOAT_WORLD_CONTACT, FLOAT_WORLD_FRICTION]),
@@ -110,7 +110,7 @@ pub const HALF: Profile = Profile {
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },
     source: "thesis §5.5, §4.4.2",
-    // The pipelines, the capacities, and that subnormal numbers count.
+    // The pipelines, no queue, the capacities, and that subnormal numbers count.
     ..NAIVE
 };
 
