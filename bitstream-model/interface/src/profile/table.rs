@@ -79,7 +79,7 @@ pub const FLOAT: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
     initiation_interval: 2,
     collisions_per_issue: 1,
-    queue: Some(0),
+    queue: Some(64),
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
     world: Some([FLOAT_WORLD_CONTACT, FLOAT_WORLD_FRICTION]),
