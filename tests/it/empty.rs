@@ -14,8 +14,7 @@ use zynq_pgs::{
 };
 
 /// The orders, and `None` for the board's own choice.
-const ORDERS: [Option<Order>; 4] =
-    [None, Some(Order::AsGiven), Some(Order::HazardFree), Some(Order::HazardFreeNearby)];
+const ORDERS: [Option<Order>; 3] = [None, Some(Order::AsGiven), Some(Order::HazardFree)];
 
 /// A pile that falls.
 struct Pile {
