@@ -115,7 +115,11 @@ fn compared(config: BoardConfig, scene: fn() -> (Vec<Body>, Vec<Collision>)) -> 
 /// Every profile, on a pipeline that waits.
 fn waiting() -> impl Iterator<Item = BoardConfig> {
     let profiles: [&'static Profile; 3] = [&NAIVE, &FLOAT, &HALF];
-    profiles.into_iter().map(|profile| BoardConfig { profile, ..BoardConfig::default() })
+    profiles.into_iter().map(|profile| BoardConfig {
+        profile,
+        queue: Some(0),
+        ..BoardConfig::default()
+    })
 }
 
 fn is_cheapest([given, reordered, default]: [StepReport; 3]) {
@@ -197,11 +201,16 @@ fn predicted_cycles_are_those_of_the_board() {
 /// the other gives the same bits.
 #[test]
 fn the_default_is_the_sequential_solve_of_its_order() {
-    let (waited, found) = step(BoardConfig::default(), wall(), &StepParameters::default());
+    let (waited, found) = step(
+        BoardConfig { queue: Some(0), ..BoardConfig::default() },
+        wall(),
+        &StepParameters::default(),
+    );
     assert_eq!(waited.order, Order::HazardFree, "the wall has hazards to keep apart");
     assert!(waited.empty == 0 && waited.cycles.stalls > 0);
     let (bodies, collisions) = wall();
-    let sequential = BoardConfig { window_slots: Some(1), ..BoardConfig::default() };
+    let sequential =
+        BoardConfig { window_slots: Some(1), queue: Some(0), ..BoardConfig::default() };
     let in_order = common::by_hand(Order::HazardFree, &bodies, &collisions, &SHAPES, 162);
     let (report, expected) = step(sequential, (bodies, in_order), &ordered(Order::AsGiven));
     assert_eq!(report.cycles.stalls, 0);
@@ -213,17 +222,21 @@ fn the_default_is_the_sequential_solve_of_its_order() {
 #[test]
 fn the_report_says_why_an_order_was_taken() {
     let choice = |config, parameters: &StepParameters| step(config, wall(), parameters).0;
-    let unchecked = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
+    let unchecked =
+        BoardConfig { hazards: Hazards::Unchecked, queue: Some(0), ..BoardConfig::default() };
     let none = StepParameters::default();
     let report = choice(unchecked, &none);
     assert_eq!((report.order, report.order_choice), (Order::HazardFree, OrderChoice::NoInterlock));
     assert!(report.empty > 0 && report.hazards == 0);
-    let report = choice(BoardConfig::default(), &ordered(Order::HazardFree));
+    let report = choice(
+        BoardConfig { queue: Some(0), ..BoardConfig::default() },
+        &ordered(Order::HazardFree),
+    );
     assert_eq!((report.order, report.order_choice), (Order::HazardFree, OrderChoice::Asked));
     // An order without hazards can be verified.
     let mut verified = none;
     verified.verify_order = true;
-    let report = choice(BoardConfig::default(), &verified);
+    let report = choice(BoardConfig { queue: Some(0), ..BoardConfig::default() }, &verified);
     assert_eq!(report.order, Order::HazardFree);
     assert!(report.verified);
 }
@@ -232,17 +245,22 @@ fn the_report_says_why_an_order_was_taken() {
 fn a_step_without_passes_or_collisions_is_sent_as_given() {
     let parameters =
         StepParameters::default().with_contact_iterations(0).with_friction_iterations(0);
-    let (report, _) = step(BoardConfig::default(), wall(), &parameters);
-    assert_eq!(report.order, Order::AsGiven);
     let (report, _) =
-        step(BoardConfig::default(), (wall().0, Vec::new()), &StepParameters::default());
+        step(BoardConfig { queue: Some(0), ..BoardConfig::default() }, wall(), &parameters);
+    assert_eq!(report.order, Order::AsGiven);
+    let (report, _) = step(
+        BoardConfig { queue: Some(0), ..BoardConfig::default() },
+        (wall().0, Vec::new()),
+        &StepParameters::default(),
+    );
     assert_eq!((report.order, report.cycles.stalls), (Order::AsGiven, 0));
 }
 
 /// A window with more issue slots than an order can keep apart.
 #[test]
 fn a_window_that_cannot_be_ordered_for_leaves_the_order_as_given() {
-    let config = BoardConfig { window_slots: Some(20_000), ..BoardConfig::default() };
+    let config =
+        BoardConfig { window_slots: Some(20_000), queue: Some(0), ..BoardConfig::default() };
     let (report, _) = step(config, wall(), &StepParameters::default());
     assert_eq!(report.order, Order::AsGiven);
     let OrderChoice::Cheapest(costs) = report.order_choice else { panic!("it was compared") };

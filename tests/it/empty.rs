@@ -48,7 +48,7 @@ impl Pile {
     }
 
     fn open(&self, profile: &'static Profile, threads: usize) -> Accelerator {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let config = BoardConfig { profile, queue: Some(0), ..BoardConfig::default() };
         open_with(config, Some(threads), &self.shapes).1
     }
 

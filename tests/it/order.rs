@@ -17,12 +17,12 @@ use zynq_pgs::validate::Excess;
 use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, StepReport};
 
 fn with(hazards: Hazards) -> BoardConfig {
-    BoardConfig { hazards, ..BoardConfig::default() }
+    BoardConfig { hazards, queue: Some(0), ..BoardConfig::default() }
 }
 
 /// A board in which every collision reads the result of all collisions before it.
 fn sequential() -> BoardConfig {
-    BoardConfig { window_slots: Some(1), ..BoardConfig::default() }
+    BoardConfig { window_slots: Some(1), queue: Some(0), ..BoardConfig::default() }
 }
 
 fn verified(order: Order) -> StepParameters {
@@ -132,7 +132,7 @@ fn every_order_is_sent_on_every_design_and_none_moves_a_body_elsewhere() {
     let orders = [Order::AsGiven, Order::Interleaved, Order::HazardFree];
     let profiles: [&'static Profile; 3] = [&NAIVE, &FLOAT, &HALF];
     for profile in profiles {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let config = BoardConfig { profile, queue: Some(0), ..BoardConfig::default() };
         for order in orders {
             let (board, mut accelerator) = open(config);
             let mut scene = pile("4x3x4", 0.0);

@@ -77,7 +77,7 @@ pub const FLOAT: Profile = Profile {
         Stripe { streams: &[0, 1, 2, 3], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
-    queue: Some(0),
+    queue: Some(64),
     initiation_interval: 2,
     collisions_per_issue: 1,
     contact: FLOAT_CONTACT,
