@@ -100,7 +100,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
         }
     }
     let [(first, some), (other, rest)] = counted[..] else { panic!("{counted:?}") };
-    let expected = format!("\norders     of 70 steps {first} in {some}, {other} in {rest}\n");
+    let expected = format!("\norders     of 80 steps {first} in {some}, {other} in {rest}\n");
     let text = run(scene).stdout;
     assert!(text.contains(&expected), "{text}");
 
