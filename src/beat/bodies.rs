@@ -46,10 +46,19 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     let (mut sums, mut good) = ([0_u32; 2], true);
     let ends = into.ends.anew(count);
     let (velocities, poses) = (whole(velocities), whole(poses));
-    let cut = |size| parts(target.scene, (count, size), ends, [velocities, poses]);
-    let work = |part| pack_part(target, bodies, part);
-    packers.each(count, cut, work, |(of_part, also): ([u32; 2], bool)| {
-        sums = [sums[0].wrapping_add(of_part[0]), sums[1].wrapping_add(of_part[1])];
+    let cut = |size| {
+        let chunks = |segment: Segment, channels| {
+            ChannelChunks::new(&segment.layout(target.scene.variant), size, channels)
+        };
+        let mut velocities = chunks(Segment::Velocities, velocities);
+        let mut poses = chunks(Segment::Poses, poses);
+        ranges(count, size).zip(ends.chunks_mut(size)).map(move |(range, ends)| {
+            (range, ends, BodyPacker::new(target, velocities.cut(), poses.cut()))
+        })
+    };
+    let work = |(range, ends, packer): (_, &mut [End], _)| pack_range(bodies, range, ends, packer);
+    packers.each(count, cut, work, |(of_range, also): ([u32; 2], bool)| {
+        sums = [sums[0].wrapping_add(of_range[0]), sums[1].wrapping_add(of_range[1])];
         good &= also;
     });
     into.statics.clear();
@@ -57,44 +66,16 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     (sums[0], sums[1], good)
 }
 
-/// A range of bodies, and the destinations of all that is made of them.
-struct Part<'a> {
-    range: Range<usize>,
-    ends: &'a mut [End],
-    velocities: Piece<'a>,
-    poses: Piece<'a>,
-}
-
-/// Cuts `count` bodies into parts of `size`.
-fn parts<'a>(
-    scene: &Scene<'_>,
-    (count, size): (usize, usize),
-    ends: &'a mut [End],
-    [velocities, poses]: [Piece<'a>; 2],
-) -> impl Iterator<Item = Part<'a>> + Send {
-    let chunks = |segment: Segment, channels| {
-        ChannelChunks::new(&segment.layout(scene.variant), size, channels)
-    };
-    let mut velocities = chunks(Segment::Velocities, velocities);
-    let mut poses = chunks(Segment::Poses, poses);
-    ranges(count, size).zip(ends.chunks_mut(size)).map(move |(range, ends)| Part {
-        range,
-        ends,
-        velocities: velocities.cut(),
-        poses: poses.cut(),
-    })
-}
-
-/// Packs one part; the sums of its velocities and poses, and whether validation accepts all bodies.
+/// Packs a range of bodies; the sums of its velocities and poses, and whether validation accepts
+/// all bodies.
 ///
 /// Only this function depends on the caller's container: it finds where the bodies of a block lie.
-fn pack_part<B: Bodies + ?Sized>(
-    target: Target<'_>,
+fn pack_range<B: Bodies + ?Sized>(
     bodies: &B,
-    part: Part<'_>,
+    range: Range<usize>,
+    ends: &mut [End],
+    mut packer: BodyPacker<'_>,
 ) -> ([u32; 2], bool) {
-    let Part { range, ends, velocities, poses } = part;
-    let mut packer = BodyPacker::new(target, velocities, poses);
     let mut copies = [NOBODY; BLOCK];
     for (first, ends) in range.step_by(BLOCK).zip(ends.chunks_mut(BLOCK)) {
         let copies = &mut copies[..ends.len()];

@@ -57,7 +57,6 @@ mod tests {
     use pgs_interface::address_map::DMA_COUNT_MAX;
     use pgs_interface::record::LANES;
     use pgs_interface::stripe::Stripe;
-    use pgs_support::chunks::Chunks;
 
     use super::*;
     use crate::beat::stripe::{Place, Segment};
@@ -247,7 +246,7 @@ mod tests {
             let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
                 .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
                 .collect();
-            let mut beats = words.iter().flat_map(|record| record.split_arrays().0).map(|it| Beat(*it));
+            let mut beats = words.iter().flat_map(|record| record.as_chunks().0).map(|it| Beat(*it));
             for at in 0..layout.beats(count) {
                 let Place { channel, slot } = layout.place(at);
                 // Padding may hold any words.
@@ -262,7 +261,7 @@ mod tests {
                         return beat;
                     }
                     let halves: [u16; 8] = bytemuck::cast(beat);
-                    let halves = halves.split_arrays::<LANES>().0[row % 2];
+                    let halves = halves.as_chunks::<LANES>().0[row % 2];
                     Beat(halves.map(number))
                 }))
                 .collect();

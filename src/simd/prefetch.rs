@@ -4,22 +4,16 @@
 /// Bytes of a line of a cache.
 const LINE: usize = 64;
 
-/// Prefetches a value.
+/// Prefetches all cache lines of a value.
 #[inline(always)]
 pub(crate) fn prefetch<T>(value: &T) {
-    lines_of(std::ptr::from_ref(value));
+    prefetch_at(std::slice::from_ref(value), 0);
 }
 
-/// Prefetches one of these values. An index past the end is harmless.
+/// Prefetches all cache lines of one of these values. An index past the end is harmless.
 #[inline(always)]
 pub(crate) fn prefetch_at<T>(values: &[T], at: usize) {
-    lines_of(values.as_ptr().wrapping_add(at));
-}
-
-/// Prefetches all cache lines of a value. Any address is allowed.
-#[inline(always)]
-fn lines_of<T>(value: *const T) {
-    let bytes = value.cast::<u8>();
+    let bytes = values.as_ptr().wrapping_add(at).cast::<u8>();
     fetch::<0>(bytes);
     if size_of::<T>() > LINE {
         fetch::<LINE>(bytes);
