@@ -100,7 +100,7 @@ fn unchecked_hazards_show_in_energy_and_velocities() {
 #[test]
 fn without_hazards_it_does_not_matter_who_waits() {
     let scene = ["--grid", "5x5x5", "--steps", "80", "--every", "80", "--verify"];
-    let sides = ["float,hazard-free,queue=0", "float,unchecked"];
+    let sides = ["float,queue=0,hazard-free", "float,unchecked"];
     let document = compare(&[&sides, &scene[..]].concat());
     let last = &document["rows"].as_array().expect("rows").last().expect("a row");
     assert_no_difference(&last["difference"], "");
