@@ -39,42 +39,44 @@ impl Place {
     #[must_use]
     pub fn nearest(collision: u32, old: &Collision, new: &Collision, reach: f32) -> Self {
         let (old, new) = (used(old), used(new));
-        let within =
-            |from: &Contact, to: &Contact| Some(squared(from, to)).filter(|d| *d <= reach * reach);
-        let (mut place, mut taken) = (Self { collision, ..Self::NEW }, [false; CONTACT_POINTS]);
+        let (mut place, mut taken) = (Self { collision, ..Self::NEW }, 0_u32);
+        let reach = reach * reach;
         for (at, (from, to)) in old.iter().zip(new).enumerate() {
-            if within(from, to).is_some() {
-                (place.points[at], taken[at]) = (at as u8, true);
+            if squared(from, to) <= reach {
+                place.points[at] = at as u8;
+                taken |= 1 << at;
             }
         }
-        for (to, point) in new.iter().zip(&mut place.points) {
-            if *point == NEW_POINT {
-                let free = old.iter().enumerate().filter(|(at, _)| !taken[*at]);
-                let near = free.filter_map(|(at, from)| Some((within(from, to)?, at)));
-                if let Some((_, at)) = near.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
-                    (*point, taken[at]) = (at as u8, true);
-                }
+        if taken != 0 && taken == (1 << new.len()) - 1 {
+            return place;
+        }
+        for (to, point) in new.iter().zip(&mut place.points).filter(|(_, at)| **at == NEW_POINT) {
+            let free = old.iter().enumerate().filter(|(at, _)| taken & 1 << at == 0);
+            let near = free.map(|(at, from)| (squared(from, to), at)).filter(|(d, _)| *d <= reach);
+            if let Some((_, at)) = near.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
+                *point = at as u8;
+                taken |= 1 << at;
             }
         }
-        if place.points == Self::NEW.points { Self::NEW } else { place }
+        if taken == 0 { Self::NEW } else { place }
     }
 
-    /// Refuses a place that a step of `limit` collisions did not have.
-    fn check(&self, index: usize, limit: usize) -> Result<(), InputError> {
-        if self.collision as usize >= limit && self.collision != u32::MAX {
-            return Err(InputError::CollisionPlace {
-                collision: index,
-                found: self.collision,
-                limit,
-            });
-        }
-        let wrong = |point: &u8| usize::from(*point) >= CONTACT_POINTS && *point != NEW_POINT;
-        match self.points.iter().position(wrong) {
-            None => Ok(()),
+    /// Whether a step of `limit` collisions had the place, or it is new: new ones count from -1.
+    fn is_of(&self, limit: u32) -> bool {
+        let points = self.points.map(|point| point.wrapping_add(1) <= CONTACT_POINTS as u8);
+        (self.collision.wrapping_add(1) <= limit) & points[0] & points[1] & points[2] & points[3]
+    }
+
+    /// The refusal of a place that is not of a step of `limit` collisions.
+    #[cold]
+    fn refuse(&self, index: usize, limit: u32) -> InputError {
+        let Self { collision: found, points } = *self;
+        let known = |point: &u8| Self { points: [*point; CONTACT_POINTS], ..Self::NEW }.is_of(0);
+        match points.iter().position(|point| !known(point)) {
             Some(contact) => {
-                let found = self.points[contact];
-                Err(InputError::PointPlace { collision: index, contact, found })
+                InputError::PointPlace { collision: index, contact, found: points[contact] }
             }
+            None => InputError::CollisionPlace { collision: index, found, limit },
         }
     }
 }
@@ -130,7 +132,9 @@ pub struct LastStep {
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     normal: [f32; 3],
-    impulses: Impulses,
+    /// The normal impulses of its points, and the 0 of a new point.
+    impulses: [f32; CONTACT_POINTS + 1],
+    friction: [f32; 2],
 }
 
 impl LastStep {
@@ -155,9 +159,13 @@ impl LastStep {
         if !placed.lengths_agree() {
             return Err(InputError::UnequalLengths { what: "collisions" });
         }
-        let mut checks = places.iter().enumerate();
-        checks.try_for_each(|(index, place)| place.check(index, self.kept.len()))?;
-        Ok(placed)
+        let limit = u32::try_from(self.kept.len()).unwrap_or(u32::MAX);
+        // Without a branch for each, as all are right.
+        if places.iter().fold(true, |all, place| all & place.is_of(limit)) {
+            return Ok(placed);
+        }
+        let wrong = places.iter().enumerate().find(|(_, place)| !place.is_of(limit));
+        wrong.map_or(Ok(placed), |(index, place)| Err(place.refuse(index, limit)))
     }
 
     /// Takes the collisions of a step that has succeeded, and the
@@ -176,10 +184,12 @@ impl LastStep {
         if found != expected || !collisions.lengths_agree() {
             return Err(InputError::OtherImpulses { found, expected });
         }
-        let kept = |(index, impulses): (usize, &Impulses)| Kept {
-            normal: collisions.collision(index).normal,
-            impulses: *impulses,
-        };
+        let kept =
+            |(index, &Impulses { normal: [a, b, c, d], friction }): (usize, &Impulses)| Kept {
+                normal: collisions.collision(index).normal,
+                impulses: [a, b, c, d, 0.0],
+                friction,
+            };
         self.kept.clear();
         self.kept.extend(impulses.iter().enumerate().map(kept));
         Ok(())
@@ -224,14 +234,14 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
         let Some(Place { collision, points }) = self.places.get(index) else {
             return Impulses::ZERO;
         };
-        let Some(Kept { normal: old, impulses }) = self.kept.get(*collision as usize) else {
+        let Some(kept) = self.kept.get(*collision as usize) else {
             return Impulses::ZERO;
         };
-        let normal = points.map(|at| impulses.normal.get(usize::from(at)).map_or(0.0, |of| *of));
+        let normal = points.map(|at| kept.impulses[usize::from(at).min(CONTACT_POINTS)]);
         let new = self.collisions.collision(index).normal;
-        let friction = match new == *old || impulses.friction == [0.0; 2] {
-            true => impulses.friction,
-            false => turned(impulses.friction, *old, new),
+        let friction = match new == kept.normal || kept.friction == [0.0; 2] {
+            true => kept.friction,
+            false => turned(kept.friction, kept.normal, new),
         };
         Impulses { normal, friction }.scaled(self.factor)
     }
@@ -241,10 +251,10 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
 fn turned([along_first, along_second]: [f32; 2], old: [f32; 3], new: [f32; 3]) -> [f32; 2] {
     let dot = |a: [f32; 3], b: [f32; 3]| (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
     let [first, second] = tangents(old);
-    // It acts on body A. Where the normal has turned round, the bodies have changed places.
-    let sign = if dot(old, new) < 0.0 { -1.0 } else { 1.0 };
-    let on_a = std::array::from_fn(|i| (first[i] * along_first + second[i] * along_second) * sign);
-    tangents(new).map(|tangent| dot(tangent, on_a))
+    let on_a = std::array::from_fn(|i| first[i] * along_first + second[i] * along_second);
+    let along = tangents(new).map(|tangent| dot(tangent, on_a));
+    // Where the normal has turned round, bodies A and B have changed places.
+    if dot(old, new) < 0.0 { along.map(|impulse| -impulse) } else { along }
 }
 
 fn used(collision: &Collision) -> &[Contact] {

@@ -168,7 +168,7 @@ pub enum InputError {
         /// The index that its place has.
         found: u32,
         /// Collisions of the last step that was committed.
-        limit: usize,
+        limit: u32,
     },
 
     /// A contact point names a place that no collision has.
