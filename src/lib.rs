@@ -118,7 +118,7 @@ pub use error::Error;
 pub use fault::Fault;
 pub use pgs_interface as interface;
 pub use scene::{
-    Bodies, Body, Collision, Collisions, Contact, ContactMemory, Impulses, Pose, Shape,
+    Bodies, Body, Collision, Collisions, Contact, Impulses, LastStep, Place, Pose, Shape,
     StepParameters, Velocity, WarmCollisions,
 };
 pub use step::{Accelerator, Detached, InFlight, Prepared, StepReport};

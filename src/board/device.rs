@@ -289,6 +289,7 @@ impl Device {
             collisions: count(plan.collisions),
             parameters,
             streamed_masses: plan.streamed_masses,
+            in_order: self.capabilities.queue > 0 && !plan.queued,
         };
         self.control.set_arguments(&arguments);
         // Buffers and descriptors must be visible before the first doorbell.

@@ -146,7 +146,7 @@ impl Accelerator {
 fn plan(bodies: usize, variant: Variant) -> Plan {
     let (collisions, passes) = (0, Passes::default());
     // The shapes of an echo fit every table.
-    Plan { bodies, collisions, passes, variant, streamed_masses: false }
+    Plan { bodies, collisions, passes, variant, streamed_masses: false, queued: false }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

@@ -60,6 +60,7 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
             passes: self.parameters.passes(),
             variant: self.limits.variant,
             streamed_masses: device.capabilities.streams_masses(self.shapes.len()),
+            queued: order_summary.queued,
         }
     }
 
@@ -75,7 +76,8 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
         let Self { bodies, collisions, .. } = *self;
         if order_summary.scheduled {
             let schedule = ordering.schedule();
-            let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
+            let added = plan.collisions.saturating_sub(schedule.collisions());
+            let added = order_summary.empty.map(|_| added);
             let collisions = &Ordered { collisions, schedule };
             let input = PackInput { bodies, collisions, added, scene };
             device.pack(plan, bank, &input)
@@ -111,7 +113,8 @@ impl Accelerator {
         let plan = input.plan(ordering, &order_summary, device);
         let given = collisions.len();
         let ordered = ordering.schedule().collisions();
-        let all_sent = !order_summary.scheduled || ordered + order_summary.empty == given;
+        let all_sent =
+            !order_summary.scheduled || ordered + order_summary.empty.unwrap_or(0) == given;
         let cancelled = engines == Engines::Idle && device.check_cancelled().is_err();
         // Packing checks everything that it sends. The full check is for the rest: input that is
         // not sent, and input whose error another error would hide.
@@ -134,11 +137,10 @@ impl Accelerator {
         }
         host.pack = watch.lap();
 
-        let without_points = match (sent, order_summary.scheduled) {
+        let without_points = match sent {
             // Nothing could move, so that validation has refused every other collision.
-            (None, _) => given,
-            (Some(_), true) => order_summary.empty,
-            (Some(_), false) => paddings,
+            None => given,
+            Some(_) => order_summary.empty.unwrap_or(paddings),
         };
         Ok(self.keep(PackedStep {
             id: UniqueId::new(),

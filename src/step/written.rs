@@ -112,8 +112,16 @@ impl Accelerator {
         let variant = limits.variant;
         let passes = parameters.passes();
         let streamed_masses = device.capabilities.streams_masses(shapes.len());
-        let mut plan =
-            Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
+        // A caller who names no order leaves it to the queue.
+        let queued = parameters.order.is_none() && device.capabilities.queue > 0;
+        let mut plan = Plan {
+            bodies: bodies.len(),
+            collisions: announced,
+            passes,
+            variant,
+            streamed_masses,
+            queued,
+        };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 
@@ -133,7 +141,7 @@ impl Accelerator {
             given: written.collisions,
             collisions: written.collisions - written.paddings,
             empty: if sent.is_some() { written.paddings } else { 0 },
-            order_summary: OrderSummary::as_given(OrderChoice::Asked),
+            order_summary: OrderSummary::as_given(OrderChoice::Asked, queued),
             shapes_loaded: self.shapes_loaded,
             host,
         }))

@@ -75,7 +75,7 @@ struct Options {
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
     /// The order for `in order`, one without hazards
-    #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
+    #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
     order: Sent,
     /// Measure this item only
     #[arg(long, value_enum)]
@@ -193,7 +193,7 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
-    let schedule = step.schedule(BoardConfig::default(), options.order.without_hazards()?)?;
+    let schedule = step.schedule(BoardConfig::default(), options.order.made()?)?;
     let order = options.order.name();
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     println!(
