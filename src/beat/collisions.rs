@@ -32,7 +32,7 @@ pub(crate) struct Entries<'a, C: ?Sized> {
     pub(crate) added: Option<usize>,
 }
 
-/// What was written, and the result of its checks.
+/// The sums of the collisions that were written, and the result of their checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Packed {
     /// The sum of the words of a pass without impulses, modulo 2^32.
@@ -141,7 +141,7 @@ const SOON: usize = 30;
 /// indices.
 const BODIES_SOON: usize = SOON / 2;
 
-/// The places of a block's collisions in an array, and of those that follow.
+/// The places of a block's collisions in an array, and of the next collisions.
 pub(crate) struct Places([u32; BLOCK + SOON]);
 
 impl Places {

@@ -13,7 +13,7 @@ use super::pool::{Piece, PieceRead, Stretch as _};
 use super::stripe::Layout;
 use crate::simd::Sum;
 
-/// Beats of which a channel's places are listed, at most: two groups.
+/// Beats of two groups, at most.
 const BEATS_MAX: usize = 16;
 
 /// The places of a channel's beats among some.

@@ -10,7 +10,7 @@ use crate::simd::{narrow, widen};
 /// last group. `integers` are the rows of a record whose last word is an unsigned integer. Of such
 /// a word sixteen bits keep the lower half: validation refuses larger integers.
 ///
-/// Shape: rows of at least the beats that the layout has for the records; half as many `halves`.
+/// Shape: `rows` and `halves` have room for the beats that the layout has for the records.
 #[inline]
 pub(crate) fn beats_of<'b, const ROWS: usize>(
     layout: &Layout,
@@ -37,7 +37,7 @@ pub(crate) fn beats_of<'b, const ROWS: usize>(
     to
 }
 
-/// Writes the rows of as many beats to `rows` as it has room for.
+/// Writes the rows of beats to `rows`, up to its end.
 #[inline]
 pub(crate) fn rows_of(format: StreamFormat, beats: &[Beat], rows: &mut [Beat]) {
     match format {

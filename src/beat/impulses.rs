@@ -48,7 +48,7 @@ impl WarmSums {
 }
 
 impl<'a> WarmSegments<'a> {
-    /// Takes the part of the next `size` collisions, which are whole blocks, or all that is left.
+    /// Takes the part of the next `size` collisions, in whole blocks, or the rest.
     pub(super) fn cut(&mut self, variant: &Variant, size: usize) -> WarmDealer<'a> {
         let channel = self.channel;
         let beats = Segment::WarmCollisions.layout(variant).beats_on_channel(size, channel);

@@ -1,7 +1,7 @@
 //! Lays records out over the channels of a board, and reads results back from them.
 //!
-//! Records go by blocks that lie in the first cache: rows of 32-bit words ([`record`]), words of the
-//! stream ([`format`]), the channels' buffers ([`deal`]).
+//! Records go by blocks that lie in the first cache: rows of 32-bit words ([`record`]), words of
+//! the stream ([`format`]), the channels' buffers ([`deal`]).
 //!
 //! [`record`]: crate::record
 

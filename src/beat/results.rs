@@ -9,7 +9,7 @@ use super::deal::{Joiner, sum_of_words};
 use super::format::rows_of;
 use super::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
 use super::stripe::{BLOCK, Layout};
-use crate::record::result::{Record, finite};
+use crate::record::result::{Record, all_finite};
 
 /// Reads the results of all records from the result segments, one a channel, on several threads if
 /// the records are many; the sum of all 32-bit words of the segments, modulo 2^32, padding
@@ -23,7 +23,7 @@ pub(crate) fn read_all(
     records: &mut [Record],
     packers: &mut PackPool,
 ) -> (u32, bool) {
-    let (mut sum, mut all_finite) = (0_u32, true);
+    let (mut sum, mut good) = (0_u32, true);
     let count = records.len();
     let cut = |size| {
         let (mut pieces, all) = (ChannelChunks::new(layout, size, whole_read(channels)), records);
@@ -32,14 +32,14 @@ pub(crate) fn read_all(
     let work = |(records, piece): (&mut [Record], PieceRead<'_>)| read(layout, piece, records);
     packers.each(count, cut, work, |(of_range, finite)| {
         sum = sum.wrapping_add(of_range);
-        all_finite &= finite;
+        good &= finite;
     });
-    (sum, all_finite)
+    (sum, good)
 }
 
 /// Reads a range of results, otherwise as [`read_all`].
 fn read(layout: &Layout, channels: PieceRead<'_>, records: &mut [Record]) -> (u32, bool) {
-    let (mut sum, mut all_finite) = (0_u32, true);
+    let (mut sum, mut good) = (0_u32, true);
     let mut joiner = Joiner::new(layout.stripe, channels);
     let mut buffer = [Beat::default(); BLOCK * result::ROWS];
     for block in records.chunks_mut(BLOCK) {
@@ -47,9 +47,9 @@ fn read(layout: &Layout, channels: PieceRead<'_>, records: &mut [Record]) -> (u3
         joiner.read(beats);
         sum = sum.wrapping_add(sum_of_words(beats));
         rows_of(layout.format, beats, block.as_flattened_mut());
-        all_finite &= block.iter().fold(true, |all, record| all & finite(record));
+        good &= all_finite(block);
     }
-    (sum, all_finite)
+    (sum, good)
 }
 
 #[cfg(test)]
@@ -61,6 +61,7 @@ mod tests {
     use super::*;
     use crate::beat::stripe::{Place, Segment};
     use crate::record::result::decode;
+    use crate::record::result::finite;
     use crate::scene::{Pose, Velocity};
     use pgs_interface::number::StreamFormat;
     use pgs_interface::profile::{HALF, PROFILES};
@@ -246,7 +247,8 @@ mod tests {
             let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
                 .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
                 .collect();
-            let mut beats = words.iter().flat_map(|record| record.as_chunks().0).map(|it| Beat(*it));
+            let rows = words.iter().flat_map(|record| record.as_chunks().0);
+            let mut beats = rows.map(|row| Beat(*row));
             for at in 0..layout.beats(count) {
                 let Place { channel, slot } = layout.place(at);
                 // Padding may hold any words.

@@ -58,8 +58,8 @@ pub(crate) fn pose(body: &Body, rows: &mut [Beat; pose::ROWS]) {
     rows[pose::ORIENTATION] = row(body, ORIENTATION);
 }
 
-/// All vectors of a body: linear velocity, angular velocity, position, orientation. The words beside
-/// each vec3 are others of the body.
+/// All vectors of a body: linear velocity, angular velocity, position, orientation. The words
+/// beside each vec3 are others of the body.
 #[inline(always)]
 pub(crate) fn vectors(body: &Body) -> [Beat; 4] {
     [LINEAR, ANGULAR, POSITION, ORIENTATION].map(|at| row(body, at))

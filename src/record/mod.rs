@@ -1,8 +1,8 @@
 //! Turns a caller's values into the rows of a record, and a result record back.
 //!
 //! A row is four words of 32 bits, which is one beat of an f32 stream. The layout is that of
-//! [`interface::record`](pgs_interface::record). `beat` makes the words of other streams, and decides
-//! which channel a beat travels on.
+//! [`interface::record`](pgs_interface::record). `beat` makes the words of other streams, and
+//! decides which channel a beat travels on.
 
 pub(crate) mod body;
 pub(crate) mod body_table;

@@ -37,12 +37,18 @@ pub(crate) fn of(pose: Pose, velocity: Velocity) -> Record {
 }
 
 /// Whether all numbers of a record are finite. The words beside each vec3 are ignored.
-#[inline(always)]
 pub(crate) fn finite(record: &Record) -> bool {
+    all_finite(std::slice::from_ref(record))
+}
+
+/// Whether all numbers of all records are finite.
+pub(crate) fn all_finite(records: &[Record]) -> bool {
     let (mut vec3, mut orientation) = (Magnitudes::default(), Magnitudes::default());
-    orientation.see(record[result::ORIENTATION]);
-    for row in [result::POSITION, result::LINEAR, result::ANGULAR] {
-        vec3.see(record[row]);
+    for record in records {
+        orientation.see(record[result::ORIENTATION]);
+        for row in [result::POSITION, result::LINEAR, result::ANGULAR] {
+            vec3.see(record[row]);
+        }
     }
     orientation.are_within(f32::MAX) & vec3.of_vec3_are_within(f32::MAX)
 }

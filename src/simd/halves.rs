@@ -26,7 +26,7 @@ pub(crate) fn narrow(rows: &[Beat], to: &mut [Beat]) {
     }
 }
 
-/// The numbers of beats of binary16 in f32: two rows a beat, as many rows as there is room for.
+/// The numbers of beats of binary16 in f32: two rows a beat, up to the end of `rows`.
 pub(crate) fn widen(beats: &[Beat], rows: &mut [Beat]) {
     let words: &[[u16; 4]] = &bytemuck::cast_slice(beats)[..rows.len()];
     #[cfg(not(target_arch = "aarch64"))]

@@ -1,4 +1,4 @@
-//! What packing needs of a processor: conversions to sixteen bits and back, sums, and prefetch.
+//! Instructions that packing uses: conversions to sixteen bits and back, sums, and prefetch.
 
 mod halves;
 mod prefetch;

@@ -60,8 +60,8 @@ fn is_unit([x, y, z]: [f32; 3]) -> bool {
 }
 
 impl Scene<'_> {
-    /// The number of contact points; a friction counts as a part of it where collisions have none
-    /// of their own. A record masks the points from this number on.
+    /// The number of contact points; unless each collision has its own friction, a friction counts
+    /// as a part of it. A record masks the points from this number on.
     #[inline(always)]
     pub(crate) const fn points(&self, collision: &Collision) -> u32 {
         collision.count & self.points
@@ -69,7 +69,7 @@ impl Scene<'_> {
 
     /// Whether validation accepts a collision with contact points, apart from the limits on the
     /// numbers of its points, and from its [rows](Self::rows_fit). It has this number of
-    /// [points](Self::points), and the ends are those of bodies A and B.
+    /// [points](Self::points), and its bodies A and B have these ends.
     #[inline(always)]
     pub(crate) fn accepts(&self, collision: &Collision, points: u32, [a, b]: [&End; 2]) -> bool {
         is_unit(collision.normal)

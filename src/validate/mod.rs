@@ -94,8 +94,8 @@ impl Limits {
 
 /// Checks the whole input of a step.
 ///
-/// Of a collision of count 0 nothing else is looked at. A step without bodies needs no shapes, and
-/// fits every board.
+/// A collision of count 0 is right, whatever its other words. A step without bodies needs no
+/// shapes, and fits every board.
 ///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
