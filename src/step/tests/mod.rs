@@ -410,8 +410,9 @@ fn a_queue_whose_numbers_are_no_permutation_fails_the_step_and_changes_nothing()
     let (mut bodies, collisions) = scene(20);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
     let (before, impulses) = (bits(&bodies), accelerator.impulses().to_vec());
+    type Spoil = fn(&mut [Beat]);
     // On a static ground nothing waits: beat 4 has the numbers 0 to 3.
-    let spoils: [(fn(&mut [Beat]), &str); 2] = [
+    let spoils: [(Spoil, &str); 2] = [
         (|beats| beats[4].0 = [1, 1, 2, 2], "found number 1 at place 1, for the second time"),
         (|beats| beats[4].0 = [20, 1_u32.wrapping_sub(20), 2, 3], "found number 20 at place 0"),
     ];
