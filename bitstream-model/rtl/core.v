@@ -223,7 +223,7 @@ module core (
     .load_b(load_write[1]), .load_address_b(load_address_b),
     .next_body_a(next_a), .next_body_b(next_b),
     .properties_a(properties_a), .properties_b(properties_b), .has_mass_a(has_mass_a), .has_mass_b(has_mass_b),
-    .queued(queued), .draining(draining), .has_slot(has_slot), .take(take), .comes_s1(comes_s1),
+    .queued(queued), .pass_ends(issues & last_issue), .has_slot(has_slot), .take(take), .comes_s1(comes_s1),
     .comes_a_s1(a_s1), .comes_b_s1(b_s1), .use_a_s2(use_a_s2), .use_b_s2(use_b_s2),
     .moves_a_s3(moves_a_s3), .moves_b_s3(moves_b_s3), .points_s3(points_s3), .body_a_s3(a_s3), .body_b_s3(b_s3),
     .collision_s3(collision_s3),

@@ -48,7 +48,7 @@ module finder #(
 
   // The issue queue: a collision is taken, and 1, 2 and 3 cycles later; a use that it writes while the phase is 0.
   input  wire                 queued,        // the step goes through it
-  input  wire                 draining,      // the pass has issued its last collision
+  input  wire                 pass_ends,     // its last collision issues
   input  wire                 has_slot,
   output wire                 take,
   output wire                 comes_s1,
@@ -120,7 +120,7 @@ module finder #(
   reg                 number_is_last, parity, one_collision;
   always @(posedge clk) begin
     one_collision <= collisions == 20'd1;     // settled before a start
-    if (clear | draining) pass_taken <= 1'b0;
+    if (clear | pass_ends) pass_taken <= 1'b0;
     else if (take & number_is_last) pass_taken <= 1'b1;
     if (clear) begin
       number         <= {COLLISION{1'b0}};

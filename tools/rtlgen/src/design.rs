@@ -59,7 +59,7 @@ impl Parameters {
             collisions,
             inertia,
             interlocked: true,
-            queue: 0,
+            queue: FLOAT.queue.unwrap_or(0),
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
