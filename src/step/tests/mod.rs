@@ -400,6 +400,9 @@ fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
     }
 }
 
+/// A change to the words of a transfer.
+type Spoil = fn(&mut [Beat]);
+
 /// The sums of all words stay right: nothing but the numbers tells.
 #[test]
 fn a_queue_whose_numbers_are_no_permutation_fails_the_step_and_changes_nothing() {
@@ -410,7 +413,6 @@ fn a_queue_whose_numbers_are_no_permutation_fails_the_step_and_changes_nothing()
     let (mut bodies, collisions) = scene(20);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
     let (before, impulses) = (bits(&bodies), accelerator.impulses().to_vec());
-    type Spoil = fn(&mut [Beat]);
     // On a static ground nothing waits: beat 4 has the numbers 0 to 3.
     let spoils: [(Spoil, &str); 2] = [
         (|beats| beats[4].0 = [1, 1, 2, 2], "found number 1 at place 1, for the second time"),
