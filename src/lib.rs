@@ -107,7 +107,7 @@ pub mod report {
     pub use crate::step::{HostTimes, Limit, OrderChoice, StepCycles};
 }
 
-pub use beat::pack::writer::Writer;
+pub use beat::writer::Writer;
 /// The emulated board itself: its configuration, its builder's handle, violations, faults.
 #[cfg(feature = "emulation")]
 pub use bitstream_model as model;

@@ -1,7 +1,7 @@
 // The accelerator without its registers: beats in, beats out.
 //
 //   receivers -> bodies ------------------------------------> velocities <-> contact, friction
-//            \-> finder -> issue -> record registers -> contact / friction pipeline
+//            \-> finder -> issue or queue -> record registers -> contact / friction pipeline
 //            \-> integrator -> integration pipeline -> senders
 //
 // An issue slot of two cycles carries a collision or nothing, and nothing behind the issue ever
@@ -26,6 +26,7 @@ module core (
   input  wire         warm_start,
   input  wire         impulses_out,
   input  wire         streamed_masses,
+  input  wire         in_order,
   input  wire [31:0]  time_step,
   input  wire [31:0]  drift,
   input  wire [31:0]  coefficient,
@@ -88,10 +89,10 @@ module core (
 
   // ---- Sequence
 
-  wire phase, slot_begins, loading, finding, passing, draining, begin_pass, integrating;
+  wire phase, slot_begins, loading, finding, passing, last_issue, draining, begin_pass, integrating;
   wire friction, first_of_kind, last_contact, parity;
   wire warm, next_warm, sends, next_sends;
-  wire [1:0] loads;
+  wire [1:0] load_pops;
   wire       load_finished;
   wire issues, stalls, waits, enters, enter_finished;
   wire [3:0] sender_finished;
@@ -102,11 +103,11 @@ module core (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(collisions), .contact_passes(contact_passes), .friction_passes(friction_passes),
     .warm_start(warm_start), .impulses_out(impulses_out),
-    .loads(|loads), .load_finished(load_finished),
+    .loads(|load_pops), .load_finished(load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
     .busy(busy), .done(done), .phase(phase), .slot_begins(slot_begins), .loading(loading), .finding(finding), .passing(passing),
-    .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
+    .last_issue(last_issue), .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
     .friction(friction), .first_of_kind(first_of_kind), .last_contact(last_contact), .parity(parity),
     .warm(warm), .next_warm(next_warm), .sends(sends), .next_sends(next_sends),
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
@@ -170,7 +171,7 @@ module core (
     .clk(clk), .clear(clear), .table_write(shape_write), .table_address(shape_address), .table_in(shape_in),
     .loading(loading), .finding(finding), .integrating(integrating),
     .bodies(bodies), .kinematic(kinematic), .streamed_masses(streamed_masses),
-    .there(there), .head({head[3], head[2], head[1], head[0]}), .loads(loads), .finished(load_finished),
+    .there(there), .head({head[3], head[2], head[1], head[0]}), .loads(load_pops), .finished(load_finished),
     .write(load_write), .write_address_a(load_address_a), .write_address_b(load_address_b),
     .velocity_a(load_velocity_a), .velocity_b(load_velocity_b), .error(load_error), .error_body(load_error_body),
     .found_a(next_a), .found_b(next_b), .entering(entering),
@@ -179,12 +180,36 @@ module core (
 
   // ---- Collisions: found, issued, registered
 
+  // The beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
+  // pipeline is the first of them. The first of both registers takes whatever is there in a slot, and
+  // `second` tells whether that is a collision. Row 7, the given impulses, means something in a warm pass alone.
+  reg  [511:0]    early;               // rows 0 to 3
+  reg  [1023:0]   rows;                // rows 0 to 7
+  reg             valid;
+  reg  [BODY-1:0] early_a, early_b, body_a, body_b;
+  reg             early_moves_a, early_moves_b, moves_a, moves_b;
+  reg  [PROPERTIES-1:0] early_mass_a, early_mass_b, mass_a, mass_b;
+  reg  [2:0]      early_points, points;
+  reg  [31:0]     friction_of;         // coefficient of the collision
+  wire            ends;                // results are there
+  wire [3:0]      room;                // for a row of each stream out
+  reg             second;              // a collision was issued in the cycle before
+
   wire               found;
   wire [COLLISION:0] last_use_a, last_use_b;
   wire [BODY-1:0]    found_a, found_b;
   wire               found_moves_a, found_moves_b;
   wire [PROPERTIES-1:0] found_mass_a, found_mass_b;
   wire [2:0]         found_points;
+  // Of the issue queue.
+  wire               has_slot, take, comes_s1, moves_a_s3, moves_b_s3;
+  wire [BODY-1:0]    a_s1, b_s1, a_s3, b_s3;
+  wire [COLLISION:0] use_a_s2, use_b_s2, use_of_body;
+  wire [2:0]         points_s3;
+  wire [COLLISION-1:0] collision_s3;
+  reg                queued;           // the step goes through it
+  always @(posedge clk) queued <= (QUEUE_DEPTH != 0) & ~in_order;
+
   wire               find_error;
   wire [7:0]         find_error_code;
   wire [19:0]        find_error_collision;
@@ -198,54 +223,113 @@ module core (
     .load_b(load_write[1]), .load_address_b(load_address_b),
     .next_body_a(next_a), .next_body_b(next_b),
     .properties_a(properties_a), .properties_b(properties_b), .has_mass_a(has_mass_a), .has_mass_b(has_mass_b),
-    .pop(issues), .found(found), .last_use_a(last_use_a), .last_use_b(last_use_b),
+    .queued(queued), .pass_ends(issues & last_issue), .has_slot(has_slot), .take(take), .comes_s1(comes_s1),
+    .comes_a_s1(a_s1), .comes_b_s1(b_s1), .use_a_s2(use_a_s2), .use_b_s2(use_b_s2),
+    .moves_a_s3(moves_a_s3), .moves_b_s3(moves_b_s3), .points_s3(points_s3), .body_a_s3(a_s3), .body_b_s3(b_s3),
+    .collision_s3(collision_s3),
+    .uses_a(queued & ~phase & valid & moves_a), .uses_b(queued & ~phase & valid & moves_b),
+    .used_a(body_a), .used_b(body_b), .used_in(use_of_body),
+    .pop(issues & ~queued), .found(found), .last_use_a(last_use_a), .last_use_b(last_use_b),
     .body_a(found_a), .body_b(found_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
     .mass_a(found_mass_a), .mass_b(found_mass_b), .points(found_points),
     .error(find_error), .error_code(find_error_code), .error_collision(find_error_collision)
   );
 
-  wire [3:0] room;                     // for a row of each stream out
-  // In the cycle before an issue the second beats of the collision before may still be in the FIFOs.
-  reg  second;                         // the second beats are taken in this cycle
-  wire [5:0] beats_needed = second ? 6'd3 : 6'd2;
+  wire loads, loads_rest;              // into the queue
+  wire takes_first = queued ? loads : issues;
+  wire takes_rest  = queued ? loads_rest : second;
+  // In the cycle before its first beats are taken the second ones of the collision before may still be in the FIFOs.
+  wire [5:0] beats_needed = takes_rest ? 6'd3 : 6'd2;
   wire beats_there = (count[0] >= beats_needed) & (count[1] >= beats_needed) & (count[2] >= beats_needed)
                    & (next_warm ? count[3] >= beats_needed : there[3]);
+  wire         in_order_issues, in_order_stalls, in_order_waits;
+  wire [31:0]  in_order_hazards;
   issue #(
     .COLLISION(COLLISION), .INTERLOCKED(DESIGN_INTERLOCKED),
     .CONTACT_WINDOW(CONTACT_WINDOW), .FRICTION_WINDOW(FRICTION_WINDOW)
   ) issuer (
-    .clk(clk), .clear(clear), .phase(phase), .passing(passing), .draining(draining),
+    .clk(clk), .clear(clear), .phase(phase), .passing(passing & ~queued), .draining(draining),
     .friction(friction), .parity(parity), .streams_ready(beats_there & (room[0] | ~next_sends)), .found(found),
     .last_use_a(last_use_a), .last_use_b(last_use_b), .moves_a(found_moves_a), .moves_b(found_moves_b),
-    .issues(issues), .stalls(stalls), .waits(waits), .hazards(hazards)
+    .issues(in_order_issues), .stalls(in_order_stalls), .waits(in_order_waits), .hazards(in_order_hazards)
   );
 
-  // Each of these is there in its own part of the step only.
-  assign pop = {{2{loads[1] | pop_odd}}, {2{loads[0] | pop_even}}} | {issues | (second & warm), {3{issues | second}}};
+  // What issues, in its cycle; the second rows in the next one.
+  localparam FACTS = COLLISION + 2 * BODY + 2 + 2 * PROPERTIES + 3;
+  wire [511:0]         heads = {head[3], head[2], head[1], head[0]};
+  wire [511:0]         first_rows, rest_rows;
+  wire [BODY-1:0]      issue_a, issue_b;
+  wire                 issue_moves_a, issue_moves_b;
+  wire [PROPERTIES-1:0] issue_mass_a, issue_mass_b;
+  wire [2:0]           issue_points;
+  wire [COLLISION-1:0] issue_number;
+  wire                 numbers_follow, numbers_valid;
+  wire [127:0]         numbers_row;
+  generate
+    if (QUEUE_DEPTH != 0) begin : g_queue
+      wire         queue_issues, queue_stalls, queue_waits;
+      wire [31:0]  queue_hazards;
+      wire [511:0] queue_first, queue_rest;
+      wire [FACTS-1:0] facts;
+      queue #(
+        .DEPTH(QUEUE_DEPTH), .SLOTS(QUEUE_SLOTS), .SLOT(QUEUE_SLOT_BITS), .BODY(BODY), .COLLISION(COLLISION),
+        .WINDOW(QUEUE_WINDOW), .FACTS(FACTS)
+      ) waiting (
+        .clk(clk), .clear(clear), .phase(phase), .passing(passing & queued), .parity(parity),
+        .collisions(collisions),
+        .has_slot(has_slot), .take(take & queued), .comes_s1(comes_s1), .a_s1(a_s1), .b_s1(b_s1),
+        .use_a_s2(use_a_s2), .use_b_s2(use_b_s2), .moves_a_s3(moves_a_s3), .moves_b_s3(moves_b_s3),
+        .facts_s3({collision_s3, a_s3, b_s3, moves_a_s3, moves_b_s3, properties_a, properties_b, points_s3}),
+        .beats_there(beats_there), .beats(heads), .loads(loads), .loads_rest(loads_rest),
+        .has_room(room[0] | ~next_sends), .issues(queue_issues), .stalls(queue_stalls), .waits(queue_waits),
+        .hazards(queue_hazards), .first(queue_first), .rest(queue_rest), .facts(facts),
+        .early_a(early_a), .early_b(early_b), .early_moves_a(early_moves_a & second),
+        .early_moves_b(early_moves_b & second), .body_a(body_a), .body_b(body_b),
+        .body_moves_a(moves_a), .body_moves_b(moves_b), .use_of_body(use_of_body)
+      );
+      issue_numbers #(.COLLISION(COLLISION)) order_sent (
+        .clk(clk), .clear(clear), .issues(queue_issues & sends), .number(issue_number), .last(last_issue),
+        .follows(numbers_follow), .ends(ends & sends & queued), .valid(numbers_valid), .beat(numbers_row)
+      );
+      assign {issues, stalls, waits, hazards} = queued
+        ? {queue_issues, queue_stalls, queue_waits, queue_hazards}
+        : {in_order_issues, in_order_stalls, in_order_waits, in_order_hazards};
+      assign first_rows = queued ? queue_first : heads;
+      assign rest_rows  = queued ? queue_rest : heads;
+      assign {issue_number, issue_a, issue_b, issue_moves_a, issue_moves_b, issue_mass_a, issue_mass_b, issue_points}
+        = queued ? facts : {{COLLISION{1'b0}}, found_a, found_b, found_moves_a, found_moves_b,
+                            found_mass_a, found_mass_b, found_points};
+    end else begin : g_no_queue
+      wire unused_of_queue = &{1'b0, take, comes_s1, a_s1, b_s1, use_a_s2, use_b_s2, moves_a_s3, moves_b_s3, a_s3, b_s3,
+                       points_s3, collision_s3, issue_number, numbers_row, last_issue};
+      assign {has_slot, loads, loads_rest, numbers_follow, numbers_valid} = 5'd0;
+      assign use_of_body  = {(COLLISION+1){1'b0}};
+      assign issue_number = {COLLISION{1'b0}};
+      assign numbers_row  = 128'd0;
+      assign {issues, stalls, waits, hazards} = {in_order_issues, in_order_stalls, in_order_waits, in_order_hazards};
+      assign {first_rows, rest_rows} = {heads, heads};
+      assign {issue_a, issue_b, issue_moves_a, issue_moves_b} = {found_a, found_b, found_moves_a, found_moves_b};
+      assign {issue_mass_a, issue_mass_b, issue_points}       = {found_mass_a, found_mass_b, found_points};
+    end
+  endgenerate
 
-  // The beats and the found facts of a collision, for the two cycles of its slot. Cycle 0 of a
-  // pipeline is the first of them. The first of both registers takes whatever is there in a slot, and
-  // `second` tells whether that is a collision. Row 7, the given impulses, means something in a warm pass alone.
-  reg  [511:0]    early;               // rows 0 to 3
-  reg  [1023:0]   rows;                // rows 0 to 7
-  reg             valid;
-  reg  [BODY-1:0] early_a, early_b, body_a, body_b;
-  reg             early_moves_a, early_moves_b, moves_a, moves_b;
-  reg  [PROPERTIES-1:0] early_mass_a, early_mass_b, mass_a, mass_b;
-  reg  [2:0]      early_points, points;
-  reg  [31:0]     friction_of;         // coefficient of the collision
+  // Each of these is there in its own part of the step only.
+  assign pop = {{2{load_pops[1] | pop_odd}}, {2{load_pops[0] | pop_even}}}
+             | {takes_first | (takes_rest & next_warm), {3{takes_first | takes_rest}}};
+
+  // What has issued moves on.
   wire [31:0]     own_friction;
   half_to_float widened (.half(early[126:112]), .number(own_friction));
   always @(posedge clk) begin
     second <= issues & ~clear;
     if (slot_begins) begin
-      early <= {head[3], head[2], head[1], head[0]};
-      {early_a, early_b, early_moves_a, early_moves_b} <= {found_a, found_b, found_moves_a, found_moves_b};
-      {early_mass_a, early_mass_b, early_points}       <= {found_mass_a, found_mass_b, found_points};
+      early <= first_rows;
+      {early_a, early_b, early_moves_a, early_moves_b} <= {issue_a, issue_b, issue_moves_a, issue_moves_b};
+      {early_mass_a, early_mass_b, early_points}       <= {issue_mass_a, issue_mass_b, issue_points};
     end
     if (phase) begin
       valid <= second & ~clear;
-      rows  <= {head[3], head[2], head[1], head[0], early};
+      rows  <= {rest_rows, early};
       friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
@@ -270,7 +354,7 @@ module core (
   end
   wire contact_ends  = ~friction & slots[CONTACT_DEPTH/2 - 1];
   wire friction_ends = friction & slots[FRICTION_DEPTH/2 - 1];
-  wire ends          = slot_begins & (contact_ends | friction_ends);
+  assign ends        = slot_begins & (contact_ends | friction_ends);
   wire reads_impulse = slot_begins & (friction ? slots[(FRICTION_IMPULSES - READ_LATENCY)/2 - 1]
                                           : slots[(CONTACT_IMPULSES - READ_LATENCY)/2 - 1]);
 
@@ -418,14 +502,15 @@ module core (
   );
   wire [127:0] result [0:3];
   wire [31:0]  sent [0:3];
-  // After the last pass of a kind the impulses of each collision, in front of the results.
+  // After the last pass of a kind the impulses of each collision, in front of the results; among them the numbers
+  // of the collisions that a queue has issued.
   reg          impulse_valid;
   reg  [127:0] impulse_row;
   always @(posedge clk) begin
     impulse_valid <= ends & sends & ~clear;
     impulse_row   <= friction ? {64'd0, friction_impulses} : contact_impulses;
   end
-  assign result[0] = impulse_valid ? impulse_row : {32'd0, new_position};
+  assign result[0] = impulse_valid ? impulse_row : numbers_valid ? numbers_row : {32'd0, new_position};
   assign result[1] = new_orientation;
   assign result[2] = {32'd0, new_linear};
   assign result[3] = {32'd0, new_angular};
@@ -433,8 +518,8 @@ module core (
     for (k = 0; k < 4; k = k + 1) begin : g_sender
       sender #(.ADDRESS(10)) stream (
         .clk(clk), .clear(clear), .stop(error), .bodies(bodies),
-        .enters(enters | ((k == 0) & issues & sends)), .has_room(room[k]),
-        .push(result_valid | ((k == 0) & impulse_valid)), .result(result_valid), .row(result[k]),
+        .enters(enters | ((k == 0) & ((issues & sends) | numbers_follow))), .has_room(room[k]),
+        .push(result_valid | ((k == 0) & (impulse_valid | numbers_valid))), .result(result_valid), .row(result[k]),
         .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),
         .finished(sender_finished[k]), .sum(sent[k])
       );

@@ -63,7 +63,7 @@ module pgs_top (
   assign m2_axis_tkeep = 16'hffff;
   assign m3_axis_tkeep = 16'hffff;
   wire unused = &{1'b0, s_axi_wstrb, bodies[31:20], collisions[31:20],
-                  contact_iterations[31:8], friction_iterations[31:8], flags[31:6]};
+                  contact_iterations[31:8], friction_iterations[31:8], flags[31:7]};
 
   control_block control (
     .clk(aclk), .resetn(aresetn),
@@ -89,7 +89,7 @@ module pgs_top (
     .bodies(bodies[19:0]), .collisions(collisions[19:0]),
     .contact_iterations(contact_iterations[7:0]), .friction_iterations(friction_iterations[7:0]),
     .integrate(flags[0]), .kinematic(flags[1]), .pair_friction(flags[2]),
-    .warm_start(flags[3]), .impulses_out(flags[4]), .streamed_masses(flags[5]),
+    .warm_start(flags[3]), .impulses_out(flags[4]), .streamed_masses(flags[5]), .in_order(flags[6]),
     .time_step(time_step), .drift(drift), .coefficient(coefficient),
     .friction_coefficient(friction), .spin_damping(spin_damping), .damping(damping),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),

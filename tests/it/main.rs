@@ -25,6 +25,7 @@ mod pack_threads;
 mod places;
 mod prepared;
 mod profiles;
+mod queue;
 mod refusals;
 mod served;
 mod shapes;

@@ -3,7 +3,7 @@
 # Yosys. A warning fails it.
 #
 # usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked; without any, the
-#                                    default build and the one with world inertia
+#                                    default build, the one with world inertia, and one with an issue queue
 #
 # Verilator's complaints about constants of the headers that a module does not use are switched off
 # there; no other warning is.
@@ -45,5 +45,8 @@ read_build() {
 	quietly yosys yosys -q -p "read_verilog $files; hierarchy -check -top pgs_top"
 }
 read_build "$@"
-if [ $# = 0 ]; then read_build --inertia world; fi
+if [ $# = 0 ]; then
+	read_build --inertia world
+	read_build --queue 64
+fi
 [ -z "$failed" ] || fail "the Verilog has warnings"

@@ -44,6 +44,8 @@ PARTS = {
     "sender": "streams",
     "finder": "finder with last uses, issue",
     "issue": "finder with last uses, issue",
+    "queue": "issue queue",
+    "issue_numbers": "issue queue",
     "true_dual_port": "velocities",
     "impulses": "impulses",
     "body_shapes": "shapes",

@@ -5,6 +5,9 @@
 // holds for each body {parity of the pass, number of the collision} of its last use: read in a cycle
 // with phase 1, written in the next one. A use in an earlier pass has the other parity, and so has
 // the value that the load writes: neither is a hazard.
+//
+// In a step through the issue queue a collision is taken while the queue has a slot for it, and not before
+// its pass, and the last uses are the queue's: written as collisions issue.
 `default_nettype none
 
 module finder #(
@@ -43,7 +46,29 @@ module finder #(
   input  wire                 has_mass_a,
   input  wire                 has_mass_b,
 
-  // The collision that is issued next.
+  // The issue queue: a collision is taken, and 1, 2 and 3 cycles later; a use that it writes while the phase is 0.
+  input  wire                 queued,        // the step goes through it
+  input  wire                 pass_ends,     // its last collision issues
+  input  wire                 has_slot,
+  output wire                 take,
+  output wire                 comes_s1,
+  output wire [BODY-1:0]      comes_a_s1,
+  output wire [BODY-1:0]      comes_b_s1,
+  output wire [COLLISION:0]   use_a_s2,
+  output wire [COLLISION:0]   use_b_s2,
+  output wire                 moves_a_s3,
+  output wire                 moves_b_s3,
+  output wire [2:0]           points_s3,
+  output wire [BODY-1:0]      body_a_s3,
+  output wire [BODY-1:0]      body_b_s3,
+  output wire [COLLISION-1:0] collision_s3,
+  input  wire                 uses_a,
+  input  wire                 uses_b,
+  input  wire [BODY-1:0]      used_a,
+  input  wire [BODY-1:0]      used_b,
+  input  wire [COLLISION:0]   used_in,
+
+  // The collision that is issued next, in the order of the records.
   input  wire                 pop,
   output wire                 found,         // a collision waits for its issue
   output wire [COLLISION:0]   last_use_a,    // {parity, collision}
@@ -67,7 +92,6 @@ module finder #(
   wire [BODY:0] next_a, next_b;
   wire [2:0]    next_count;
   wire          there_a, there_b, there_count, has_room;
-  wire          take;
   wire [5:0]    counts_left, a_left, b_left, found_left;
   wire          counts_below, a_below, b_below;
   wire          unused = &{1'b0, counts_left, a_left, b_left, found_left, counts_below, a_below, b_below};
@@ -87,7 +111,8 @@ module finder #(
     .pop(take), .head(next_b), .count(b_left), .some(there_b), .below(b_below)
   );
 
-  assign take = run & phase & there_a & there_b & there_count & has_room;
+  reg  pass_taken;                    // all collisions of the pass
+  assign take = run & phase & there_a & there_b & there_count & (queued ? has_slot & ~pass_taken : has_room);
 
   // The number and the pass of the collision that is taken.
   reg [COLLISION-1:0] number;
@@ -95,6 +120,8 @@ module finder #(
   reg                 number_is_last, parity, one_collision;
   always @(posedge clk) begin
     one_collision <= collisions == 20'd1;     // settled before a start
+    if (clear | pass_ends) pass_taken <= 1'b0;
+    else if (take & number_is_last) pass_taken <= 1'b1;
     if (clear) begin
       number         <= {COLLISION{1'b0}};
       left           <= collisions;
@@ -147,19 +174,18 @@ module finder #(
   assign next_body_b = next_b[BODY-1:0];
 
   localparam [COLLISION:0] NEVER = {1'b1, {COLLISION{1'b0}}};
-  wire                 uses = valid_s1 & (count_s1 != 3'd0);
+  wire                 uses = valid_s1 & (count_s1 != 3'd0) & ~queued;
   wire                 load = load_a | load_b;
-  wire [BODY-1:0]      use_address_a = load ? load_address_a : phase ? next_a[BODY-1:0] : a_s1[BODY-1:0];
-  wire [BODY-1:0]      use_address_b = load ? load_address_b : phase ? next_b[BODY-1:0] : b_s1[BODY-1:0];
-  wire [COLLISION:0]   use_in = load ? NEVER : {parity_s1, number_s1};
-  wire [COLLISION:0]   use_a_s2, use_b_s2;
+  wire [BODY-1:0]      use_address_a = load ? load_address_a : phase ? next_a[BODY-1:0] : queued ? used_a : a_s1[BODY-1:0];
+  wire [BODY-1:0]      use_address_b = load ? load_address_b : phase ? next_b[BODY-1:0] : queued ? used_b : b_s1[BODY-1:0];
+  wire [COLLISION:0]   use_in = load ? NEVER : queued ? used_in : {parity_s1, number_s1};
   reg  [COLLISION:0]   use_a_s3, use_b_s3;
   true_dual_port #(
     .WIDTH(COLLISION + 1), .DEPTH(BODIES), .ADDRESS(BODY), .OUTPUT_STAGES(1)
   ) last_uses (
     .clk(clk),
-    .write_a(load ? load_a : uses), .address_a(use_address_a), .in_a(use_in), .out_a(use_a_s2),
-    .write_b(load ? load_b : uses), .address_b(use_address_b), .in_b(use_in), .out_b(use_b_s2)
+    .write_a(load ? load_a : uses | uses_a), .address_a(use_address_a), .in_a(use_in), .out_a(use_a_s2),
+    .write_b(load ? load_b : uses | uses_b), .address_b(use_address_b), .in_b(use_in), .out_b(use_b_s2)
   );
   always @(posedge clk) begin
     use_a_s3 <= use_a_s2;
@@ -167,12 +193,19 @@ module finder #(
   end
 
   wire padding    = count_s3 == 3'd0;
-  wire moves_a_s3 = has_mass_a & ~padding;
-  wire moves_b_s3 = has_mass_b & ~padding;
+  assign moves_a_s3   = has_mass_a & ~padding;
+  assign moves_b_s3   = has_mass_b & ~padding;
+  assign comes_s1     = valid_s1 & queued;
+  assign comes_a_s1   = a_s1[BODY-1:0];
+  assign comes_b_s1   = b_s1[BODY-1:0];
+  assign body_a_s3    = a_s3;
+  assign body_b_s3    = b_s3;
+  assign collision_s3 = number_s3;
+  assign points_s3    = count_s3;
 
   localparam WIDTH = 2 * (COLLISION + 1) + 2 * BODY + 2 + 2 * PROPERTIES + 3;
   fifo #(.WIDTH(WIDTH), .ADDRESS(5), .LIMIT(24)) found_collisions (
-    .clk(clk), .clear(clear), .push(valid_s3),
+    .clk(clk), .clear(clear), .push(valid_s3 & ~queued),
     .in({use_a_s3, use_b_s3, a_s3, b_s3, moves_a_s3, moves_b_s3, properties_a, properties_b, count_s3}),
     .pop(pop),
     .head({last_use_a, last_use_b, body_a, body_b, moves_a, moves_b, mass_a, mass_b, points}),

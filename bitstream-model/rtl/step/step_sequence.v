@@ -4,7 +4,7 @@
 //             cycles                         ends when
 //   load      ceil(B / 2)                    all bodies are taken; with world inertia B cycles
 //   setup     SETUP                          the finder has found the first collision
-//   pass      2 C - 1                        the last collision is issued
+//   pass      2 C - 1                        the last collision is issued; with the filling of a queue
 //   drain     fill + 1                       its write-back can be read
 //   enter     B                              all bodies are in the integration
 //   leave     FINISH                         all results have left
@@ -44,6 +44,7 @@ module step_sequence #(
   output wire        loading,
   output reg         finding,
   output reg         passing,
+  output reg         last_issue,        // the next issue is the last one of the pass
   output wire        draining,
   output wire        begin_pass,        // in the cycle before a pass or the integration
   output wire        integrating,
@@ -77,7 +78,6 @@ module step_sequence #(
   reg [2:0]  state;
   reg [3:0]  setup;
   reg [19:0] left;                      // collisions of the pass that are not issued
-  reg        left_one;
   reg [9:0]  drain;
   reg        drain_one;
   reg [8:0]  contacts_left, frictions_left;
@@ -147,7 +147,7 @@ module step_sequence #(
         PREPARE: begin
           setup    <= setup + 4'd1;
           left     <= collisions;
-          left_one <= one_collision;
+          last_issue <= one_collision;
           if (setup == FIND - 4'd1) finding <= 1'b1;
           if (setup_ends) begin
             state   <= no_passes ? ENTER : PASS;
@@ -157,12 +157,12 @@ module step_sequence #(
         end
         PASS: if (issues) begin
           left         <= left - 20'd1;
-          left_one     <= left == 20'd2;
+          last_issue     <= left == 20'd2;
           pass_is_last <= friction ? frictions_left == 9'd1
                         : (contacts_left == 9'd1) & (frictions_left == 9'd0);
           drain        <= friction ? FRICTION_FILL[9:0] : CONTACT_FILL[9:0];
           drain_one    <= 1'b0;
-          if (left_one) begin
+          if (last_issue) begin
             state   <= DRAIN;
             passing <= 1'b0;
             parity  <= ~parity;
@@ -172,7 +172,7 @@ module step_sequence #(
           drain     <= drain - 10'd1;
           drain_one <= drain == 10'd1;
           left      <= collisions;
-          left_one  <= one_collision;
+          last_issue  <= one_collision;
           next_warm  <= warm_start & kind_changes;
           next_sends <= impulses_out & next_is_last;
           if (drain_one) begin

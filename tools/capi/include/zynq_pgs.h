@@ -75,9 +75,9 @@ typedef enum zpgs_order {
     // As the caller gives them.
     ZPGS_ORDER_AS_GIVEN = 1,
     // No hazards, collisions near to their given places.
-    ZPGS_ORDER_HAZARD_FREE_NEARBY = 2,
-    // No hazards and few bodies alive.
     ZPGS_ORDER_HAZARD_FREE = 3,
+    // Far places of the list in turn, for a board with an issue queue.
+    ZPGS_ORDER_INTERLEAVED = 8,
 } zpgs_order;
 
 // An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.

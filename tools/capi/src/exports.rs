@@ -14,7 +14,7 @@ use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
 use crate::barrier::{call, call_with};
 use crate::collision::{Collision, Impulses, count_with_friction};
 use crate::failure::Failure;
-use crate::handle::AcceleratorHandle;
+use crate::handle::{AcceleratorHandle, State};
 use crate::last_error;
 use crate::memory::{self, BodiesView, CollisionsView, Out, Span};
 use crate::parameters::Parameters;
@@ -211,16 +211,8 @@ pub unsafe extern "C" fn zpgs_submit(
     collisions: *const CollisionArray,
     parameters: *const Parameters,
 ) -> Status {
-    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-    // returns: `# Safety` of this function.
-    let handle = unsafe { memory::handle(accelerator) };
-    call_with(handle, |state| {
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
-        // call; this call alone uses the bodies, and no thread writes the others.
-        let (bodies, collisions, parameters) =
-            unsafe { read_input(bodies, collisions, parameters) }?;
-        state.submit(&bodies, &collisions, &parameters)
-    })
+    // SAFETY: `# Safety` of this function.
+    unsafe { with_input(accelerator, bodies, collisions, parameters, State::submit) }
 }
 
 /// Waits for the step in flight and stores its results in `bodies`. The caller gives the bodies of
@@ -356,6 +348,29 @@ fn check_impulses(
         ));
     }
     Ok(())
+}
+
+/// Acts with the input of a step.
+///
+/// # Safety
+/// As [`zpgs_step`].
+pub(crate) unsafe fn with_input<'a>(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+    act: fn(&mut State, &BodiesView, &CollisionsView<'a>, &StepParameters) -> Result<(), Failure>,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
+        // call; this call alone uses the bodies, and no thread writes the others.
+        let (bodies, collisions, parameters) =
+            unsafe { read_input(bodies, collisions, parameters) }?;
+        act(state, &bodies, &collisions, &parameters)
+    })
 }
 
 /// Reads and checks the input of a step.

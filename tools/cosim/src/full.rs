@@ -34,6 +34,7 @@ fn scene(seed: u64, inertia: Inertia, warm_start: bool) -> Scene {
     }
     scene.arguments.warm_start = warm_start;
     scene.arguments.impulses_out = true;
+    scene.arguments.in_order = warm_start;
     scene.arguments.contact_iterations = 1;
     scene.arguments.friction_iterations = 2;
     scene

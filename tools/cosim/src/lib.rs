@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accesses;
+pub mod crowded;
 pub mod flaws;
 pub mod full;
 pub mod mutation;

@@ -13,13 +13,15 @@ use bitstream_model::external::{
 use bitstream_model::{BoardConfig, Hazards};
 use clap::{Parser, Subcommand, ValueEnum};
 use cosim::accesses;
+use cosim::crowded;
 use cosim::flaws::{Flawed, Flaws};
 use cosim::mutation::{MUTATIONS, Mutation};
 use cosim::outcome::{self, Arrival, Outcome, difference};
 use cosim::packets::packets;
 use cosim::refusal::{Refusal, refusals};
+use cosim::scene::Scene;
 use cosim::{full, random, recorded};
-use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, error};
+use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, QUEUE, error};
 use pgs_interface::profile::Inertia;
 use pgs_interface::register::Register;
 use rtlgen::design::{Design, Parameters};
@@ -45,6 +47,7 @@ Examples:
   cosim random --simulator target/rtl-world/pgs-rtl --inertia world
   cosim errors --simulator target/rtl/pgs-rtl
   cosim full --simulator target/rtl/pgs-rtl
+  cosim crowded --simulator target/rtl/pgs-rtl --queue 64
   cosim registers --simulator target/rtl/pgs-rtl --cases 500
   cosim mutations                      builds a simulator for each: about a minute and a half each
 
@@ -88,6 +91,9 @@ struct BuildArgs {
     /// The inertia for which it was built
     #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
     inertia: InertiaForm,
+    /// The depth of the issue queue with which it was built [default: that of the default build]
+    #[arg(long, value_name = "N")]
+    queue: Option<u32>,
 }
 
 impl BuildArgs {
@@ -99,7 +105,7 @@ impl BuildArgs {
         };
         let inertia = self.inertia.into();
         let fence = Some(Parameters::with(inertia).memory);
-        BoardConfig { hazards, inertia, fence, ..Default::default() }
+        BoardConfig { hazards, inertia, fence, queue: self.queue, ..Default::default() }
     }
 }
 
@@ -154,6 +160,11 @@ enum Verb {
     },
     /// Steps whose streams out are full for a while
     Full {
+        #[command(flatten)]
+        simulator: SimulatorArgs,
+    },
+    /// Steps whose collisions hinder each other: one body in all, and a pair that starves
+    Crowded {
         #[command(flatten)]
         simulator: SimulatorArgs,
     },
@@ -263,6 +274,7 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
             writeln!(out, "{text}")?;
             difference.is_none()
         }
+        Verb::Crowded { simulator } => run_crowded(simulator, out)?,
         Verb::Errors { simulator } => run_errors(simulator, out)?,
         Verb::Model { build, wrong, dies_after, hangs_after, .. } => {
             let [dies_after, hangs_after] = [*dies_after, *hangs_after];
@@ -295,6 +307,17 @@ impl Bench {
         let inertia = config.inertia;
         Ok(Self { inertia, arrival, rtl: Box::new(rtl), model: Box::new(model) })
     }
+
+    fn has_queue(&mut self) -> Result<bool, ExternalError> {
+        Ok(self.model.read(QUEUE.offset)? != 0)
+    }
+
+    /// A sound step's outcomes of the Verilog and of the model.
+    fn outcomes(&mut self, scene: &Scene) -> Result<[Outcome; 2], ExternalError> {
+        let beats = packets(scene, None);
+        let rtl = outcome::run(&mut *self.rtl, scene, &beats)?;
+        Ok([rtl, outcome::run(&mut *self.model, scene, &beats)?])
+    }
 }
 
 fn run_recorded(
@@ -306,10 +329,8 @@ fn run_recorded(
     let mut good = true;
     for path in folders {
         let folder = Folder::load(path)?;
-        let scene = recorded::scene(&folder, bench.inertia);
-        let beats = packets(&scene, None);
-        let rtl = outcome::run(&mut *bench.rtl, &scene, &beats)?;
-        let model = outcome::run(&mut *bench.model, &scene, &beats)?;
+        let mut scene = recorded::scene(&folder, bench.inertia);
+        let [rtl, model] = bench.outcomes(&scene)?;
         let name = path.file_name().map_or(Path::new("."), Path::new).display();
         if args.build.hazards == HazardMode::Interlocked {
             let (differ, all) = recorded::differences(&folder, &rtl)?;
@@ -317,6 +338,16 @@ fn run_recorded(
             good &= differ == 0;
         }
         writeln!(out, "  {}", counters(&rtl, &model))?;
+        if let Some(difference) = difference(&model, &rtl, bench.arrival) {
+            writeln!(out, "  not the model's: {difference}")?;
+            good = false;
+        }
+        if !bench.has_queue()? {
+            continue;
+        }
+        scene.arguments.in_order = false;
+        let [rtl, model] = bench.outcomes(&scene)?;
+        writeln!(out, "  through the queue: {}", counters(&rtl, &model))?;
         if let Some(difference) = difference(&model, &rtl, bench.arrival) {
             writeln!(out, "  not the model's: {difference}")?;
             good = false;
@@ -351,6 +382,21 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
         }
     }
     Ok(None)
+}
+
+/// Whether the Verilog does each step that is hard for a queue as the model does.
+fn run_crowded(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure> {
+    let mut bench = Bench::new(args)?;
+    let mut good = true;
+    for (name, scene) in crowded::scenes(bench.inertia) {
+        let [rtl, model] = bench.outcomes(&scene)?;
+        writeln!(out, "{name}: {}", counters(&rtl, &model))?;
+        if let Some(difference) = difference(&model, &rtl, bench.arrival) {
+            writeln!(out, "  not the model's: {difference}")?;
+            good = false;
+        }
+    }
+    Ok(good)
 }
 
 /// Whether the Verilog reports each error as the model does.
@@ -393,7 +439,8 @@ fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<boo
         if mutations.peek().is_none() {
             continue;
         }
-        let files = emit::files(&Design::new(Parameters::with(inertia)));
+        let design = Design::new(Parameters { queue: MUTANTS_QUEUE, ..Parameters::with(inertia) });
+        let files = emit::files(&design);
         if let Some(difference) = difference_of(&files, form, cases)? {
             writeln!(out, "the design with {inertia:?} inertia, without a mutation: {difference}")?;
             return Ok(false);
@@ -413,8 +460,11 @@ fn run_mutations(cases: u64, only: &[String], out: &mut dyn Write) -> Result<boo
     Ok(all_found)
 }
 
-/// Builds a simulator of these files; the first random step, or step with full streams, on which it
-/// and the model differ.
+/// Depth of the queue of designs with a mistake: random steps fill it, and it is small to build.
+const MUTANTS_QUEUE: u32 = 16;
+
+/// Builds a simulator of these files; the first random step, or step with a starving collision or
+/// with full streams, on which it and the model differ.
 fn difference_of(
     files: &[File],
     inertia: InertiaForm,
@@ -423,13 +473,17 @@ fn difference_of(
     let folder = tempfile::tempdir()?;
     let mut args = SimulatorArgs {
         simulator: simulator::build_files(files, folder.path(), Waveform::None)?,
-        build: BuildArgs { hazards: HazardMode::Interlocked, inertia },
+        build: BuildArgs { hazards: HazardMode::Interlocked, inertia, queue: Some(MUTANTS_QUEUE) },
         gaps: 0,
         stalls: 0,
     };
-    let found = first_difference(&mut Bench::new(&args)?, 1, cases)?;
-    if found.is_some() {
-        return Ok(found);
+    let mut bench = Bench::new(&args)?;
+    if let Some(found) = first_difference(&mut bench, 1, cases)? {
+        return Ok(Some(found));
+    }
+    let [rtl, model] = bench.outcomes(&crowded::starving(bench.inertia))?;
+    if let Some(found) = difference(&model, &rtl, bench.arrival) {
+        return Ok(Some(format!("a starving pair: {found}")));
     }
     // Without hazards the issue soon waits for a stream that lags behind the others.
     args.gaps = 300;

@@ -6,9 +6,9 @@ use bitstream_model::external::{
 use pgs_interface::control::{
     self, ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, CYCLES_LO, ERROR,
     ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
-    IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, RESET, SHAPE_STRIDE,
-    SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES, WORK_CYCLES,
-    ap_ctrl, flags,
+    IMPULSE_SUM_HI, IMPULSE_SUM_LO, POSITION_COEFFICIENT, POSITION_DRIFT, QUEUE, RESET,
+    SHAPE_STRIDE, SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES,
+    WORK_CYCLES, ap_ctrl, flags,
 };
 use pgs_interface::register::Register;
 
@@ -29,7 +29,7 @@ const CLOCKS_MAX: u64 = 400_000_000;
 pub struct Outcome {
     /// The beats of each result stream.
     pub results: [Vec<StreamBeat>; STREAMS],
-    /// Beats of impulses that stream 0 has in front of its results.
+    /// Beats of impulses and numbers that stream 0 has in front of its results.
     pub impulse_beats: usize,
     /// ERROR and `ERROR_DETAIL`.
     pub error: [u32; 2],
@@ -101,7 +101,7 @@ pub(crate) fn finish(
     let mut read = |offset: u32| accelerator.read(offset);
     Ok(Outcome {
         results,
-        impulse_beats: scene.impulse_beats(),
+        impulse_beats: scene.impulse_beats(read(QUEUE.offset)? != 0),
         error: [read(ERROR.offset)?, read(ERROR_DETAIL.offset)?],
         ended: !busy,
         work: read(WORK_CYCLES.offset)?,
@@ -181,7 +181,8 @@ fn flags_of(arguments: &Arguments) -> u32 {
     let word = flags::PAIR_FRICTION.put(word, arguments.pair_friction.into());
     let word = flags::WARM_START.put(word, arguments.warm_start.into());
     let word = flags::IMPULSES_OUT.put(word, arguments.impulses_out.into());
-    flags::STREAMED_MASSES.put(word, arguments.streamed_masses.into())
+    let word = flags::STREAMED_MASSES.put(word, arguments.streamed_masses.into());
+    flags::IN_ORDER.put(word, arguments.in_order.into())
 }
 
 pub(crate) fn set_up(

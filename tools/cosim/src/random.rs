@@ -18,6 +18,9 @@ pub struct Case {
     pub fault: Option<FaultAt>,
 }
 
+/// Collisions in a queue of the usual depth.
+const QUEUED_MOST: u32 = 64;
+
 const SUBNORMAL: u32 = 0x0040_0001;
 const NEGATIVE_ZERO: u32 = 0x8000_0000;
 const NAN: u32 = 0x7FC0_1234;
@@ -229,6 +232,7 @@ pub fn case(seed: u64, inertia: Inertia) -> Case {
         warm_start: false,
         impulses_out: false,
         streamed_masses: false,
+        in_order: false,
         numbers: [
             (1.0_f32 / 60.0).to_bits(),
             draw.number(0.02).abs().to_bits(),
@@ -290,6 +294,15 @@ pub fn case(seed: u64, inertia: Inertia) -> Case {
     if inertia == Inertia::World {
         draw.world(&mut case.scene);
     }
+    case.scene.arguments.in_order = draw.one_in(3);
+    // More than a queue holds: some collisions over and over, which meet hazards.
+    if draw.one_in(4) {
+        let collisions = &mut case.scene.collisions;
+        let few = u32::try_from(collisions.len()).unwrap_or(0);
+        for _ in 0..if few > 0 { draw.below(2 * QUEUED_MOST) } else { 0 } {
+            collisions.push(collisions[draw.below(few) as usize]);
+        }
+    }
     case
 }
 
@@ -325,6 +338,9 @@ mod tests {
                     assert!(cases.iter().any(|case| has(case) && case.fault.is_some()));
                 }
             }
+            let queued = |case: &Case| !case.scene.arguments.in_order;
+            assert!(cases.iter().any(|case| queued(case) && case.scene.collisions.len() > 128));
+            assert!(cases.iter().any(|case| !queued(case) && case.scene.collisions.len() > 128));
             for count in 0..=5 {
                 let has =
                     |collision: &Collision| (collision.count & !FRICTION_BITS).min(5) == count;

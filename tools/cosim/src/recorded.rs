@@ -9,7 +9,7 @@ use zynq_pgs::Body as DriverBody;
 use crate::outcome::Outcome;
 use crate::scene::{Arguments, Body, Collision, Scene, Shape};
 
-/// The scene of a folder, in the order of its arrays, for an accelerator with that form of inertia.
+/// The scene of a folder, in the order of its arrays and past a queue, for an accelerator with that form of inertia.
 /// The shapes of the folder have one moment of inertia about every axis; with world inertia each
 /// body brings it, and its mass.
 #[must_use]
@@ -65,6 +65,7 @@ pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
             warm_start: false,
             impulses_out: parameters.impulses_out,
             streamed_masses: inertia == Inertia::World,
+            in_order: true,
             numbers: [
                 parameters.time_step,
                 parameters.position_drift,

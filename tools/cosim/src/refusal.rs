@@ -5,7 +5,7 @@ use pgs_interface::profile::Inertia;
 use pgs_interface::register::Register;
 
 use crate::packets::{Fault, FaultAt};
-use crate::scene::{Arguments, Body, Collision, Scene, Shape};
+use crate::scene::Scene;
 
 /// A step that is refused.
 #[derive(Debug, Clone)]
@@ -27,52 +27,7 @@ const WRONG: usize = 3;
 
 /// Five bodies in a row, the last one static, and a collision of each with its neighbour.
 fn scene(inertia: Inertia) -> Scene {
-    let one = 1.0_f32.to_bits();
-    let moves = Shape { inverse_mass: one, inverse_inertia: one };
-    let fixed = Shape { inverse_mass: 0, inverse_inertia: 0 };
-    let bodies: Vec<Body> = [0.0_f32, 1.0, 2.0, 3.0, 4.0]
-        .iter()
-        .enumerate()
-        .map(|(index, x)| Body {
-            linear: [0; 3],
-            angular: [0; 3],
-            position: [x.to_bits(), 0, 0],
-            orientation: [0, 0, 0, one],
-            shape: u32::from(index == 4),
-            inverse_inertia: [one, one, one, 0, 0, 0],
-            inverse_mass: one,
-        })
-        .collect();
-    let collisions = (0..4_u32).map(|body| {
-        let sides = [body + 1, body];
-        Collision {
-            bodies: sides,
-            positions: sides.map(|side| bodies[side as usize].position),
-            normal: [one, 0, 0],
-            count: 1,
-            points: [[0; 4]; 4],
-            impulses: [[one, 0, 0, 0]; 2],
-        }
-    });
-    let arguments = Arguments {
-        contact_iterations: 2,
-        friction_iterations: 2,
-        integrate: true,
-        kinematic: false,
-        pair_friction: false,
-        warm_start: false,
-        impulses_out: true,
-        streamed_masses: false,
-        numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
-        gravity: [0, (-9.8_f32).to_bits(), 0],
-    };
-    Scene {
-        inertia,
-        shapes: vec![moves, fixed],
-        collisions: collisions.collect(),
-        bodies,
-        arguments,
-    }
+    Scene::row(inertia, 5, (0..4).map(|body| [body + 1, body]))
 }
 
 /// At least one step for each error code of a design that streams the collisions once a pass.

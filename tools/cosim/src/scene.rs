@@ -1,5 +1,6 @@
 //! A step as words, as an accelerator of profile `float` takes it; nothing in it need make sense.
 
+use pgs_interface::control::NUMBERS_PER_BEAT;
 use pgs_interface::profile::Inertia;
 use pgs_interface::record::CONTACT_POINTS;
 
@@ -68,6 +69,8 @@ pub struct Arguments {
     pub impulses_out: bool,
     /// Whether each body brings its mass: with world inertia alone.
     pub streamed_masses: bool,
+    /// Whether collisions enter in the order of the stream, past the issue queue.
+    pub in_order: bool,
     /// Time step, drift, position coefficient, friction, angular damping, spin damping, as bits of
     /// f32.
     pub numbers: [u32; 6],
@@ -91,6 +94,52 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Bodies in a row, the last one static, with a collision of each of these pairs.
+    #[must_use]
+    pub fn row(inertia: Inertia, bodies: u16, pairs: impl IntoIterator<Item = [u32; 2]>) -> Self {
+        let one = 1.0_f32.to_bits();
+        let moves = Shape { inverse_mass: one, inverse_inertia: one };
+        let fixed = Shape { inverse_mass: 0, inverse_inertia: 0 };
+        let body = |index: u16| Body {
+            linear: [0; 3],
+            angular: [0; 3],
+            position: [f32::from(index).to_bits(), 0, 0],
+            orientation: [0, 0, 0, one],
+            shape: u32::from(index + 1 == bodies),
+            inverse_inertia: [one, one, one, 0, 0, 0],
+            inverse_mass: one,
+        };
+        let bodies: Vec<Body> = (0..bodies).map(body).collect();
+        let collisions = pairs.into_iter().map(|sides| Collision {
+            bodies: sides,
+            positions: sides.map(|side| bodies[side as usize].position),
+            normal: [one, 0, 0],
+            count: 1,
+            points: [[0; 4]; CONTACT_POINTS],
+            impulses: [[one, 0, 0, 0]; 2],
+        });
+        let arguments = Arguments {
+            contact_iterations: 2,
+            friction_iterations: 2,
+            integrate: true,
+            kinematic: false,
+            pair_friction: false,
+            warm_start: false,
+            impulses_out: true,
+            streamed_masses: false,
+            in_order: false,
+            numbers: [1.0_f32 / 60.0, 0.0, 0.2, 0.5, 0.9, 0.1].map(f32::to_bits),
+            gravity: [0, (-9.8_f32).to_bits(), 0],
+        };
+        Self {
+            inertia,
+            shapes: vec![moves, fixed],
+            collisions: collisions.collect(),
+            bodies,
+            arguments,
+        }
+    }
+
     /// Contact passes and friction passes, the warm ones among them.
     #[must_use]
     pub fn passes(&self) -> [u32; 2] {
@@ -102,10 +151,14 @@ impl Scene {
         })
     }
 
-    /// Beats of impulses in front of the results.
+    /// Beats of impulses in front of the results, with the beats of numbers among them if the
+    /// accelerator has a queue.
     #[must_use]
-    pub fn impulse_beats(&self) -> usize {
+    pub fn impulse_beats(&self, has_queue: bool) -> usize {
         let kinds = self.passes().into_iter().filter(|passes| *passes > 0).count();
-        if self.arguments.impulses_out { kinds * self.collisions.len() } else { 0 }
+        let impulses = self.collisions.len();
+        let queued = has_queue && !self.arguments.in_order;
+        let numbers = if queued { impulses.div_ceil(NUMBERS_PER_BEAT as usize) } else { 0 };
+        if self.arguments.impulses_out { kinds * (impulses + numbers) } else { 0 }
     }
 }

@@ -18,6 +18,9 @@ pub struct Parameters {
     /// Whether a collision waits for the velocities that it needs; otherwise it reads stale ones,
     /// and HAZARDS counts.
     pub interlocked: bool,
+    /// Collisions that wait in the issue queue; 0: none, collisions enter in the order of the
+    /// stream.
+    pub queue: u32,
     /// Registers in front of the velocities and the impulses.
     pub address_stages: u32,
     /// Registers behind the velocities and the impulses.
@@ -56,6 +59,7 @@ impl Parameters {
             collisions,
             inertia,
             interlocked: true,
+            queue: FLOAT.queue.unwrap_or(0),
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
@@ -67,15 +71,30 @@ impl Parameters {
 
 /// A build that the hardware cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{address_stages} registers in front of the memories and {output_stages} behind them give a \
-     read latency of {latency} cycles, expected an even number: a port reads in one cycle of a \
-     slot and writes in the other; add a register on either side"
-)]
-pub struct OddReadLatency {
-    address_stages: u32,
-    output_stages: u32,
-    latency: u32,
+pub enum BuildError {
+    /// A collision would take the velocities of the one before it.
+    #[error(
+        "{address_stages} registers in front of the memories and {output_stages} behind them give \
+         a read latency of {latency} cycles, expected an even number: a port reads in one cycle of \
+         a slot and writes in the other; add a register on either side"
+    )]
+    OddReadLatency {
+        /// Registers in front of the memories.
+        address_stages: u32,
+        /// Registers behind them.
+        output_stages: u32,
+        /// Cycles from an address to the word.
+        latency: u32,
+    },
+    /// A queue waits for hazards to be over, and an unchecked build does not know of them.
+    #[error(
+        "an issue queue of {queue} collisions in an unchecked build, expected none: take an \
+         interlocked one, or a queue of 0"
+    )]
+    UncheckedQueue {
+        /// The requested depth.
+        queue: u32,
+    },
 }
 
 impl Parameters {
@@ -89,14 +108,17 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// [`OddReadLatency`], with which a collision would take the velocities of the one before it.
-    pub fn check(&self) -> Result<(), OddReadLatency> {
+    /// Every [`BuildError`].
+    pub fn check(&self) -> Result<(), BuildError> {
         let latency = self.read_latency();
-        if latency.is_multiple_of(FLOAT.initiation_interval) {
-            return Ok(());
+        let Self { address_stages, output_stages, queue, .. } = *self;
+        if !latency.is_multiple_of(FLOAT.initiation_interval) {
+            return Err(BuildError::OddReadLatency { address_stages, output_stages, latency });
         }
-        let Self { address_stages, output_stages, .. } = *self;
-        Err(OddReadLatency { address_stages, output_stages, latency })
+        if queue > 0 && !self.interlocked {
+            return Err(BuildError::UncheckedQueue { queue });
+        }
+        Ok(())
     }
 
     /// Cycles from an address to the velocity or the impulses.
@@ -191,6 +213,14 @@ impl Design {
 }
 
 impl Design {
+    /// The hazard window of a step through the queue, in slots of issue: the longer one, rounded
+    /// up.
+    #[must_use]
+    pub fn window_slots(&self) -> u32 {
+        let windows = [&self.contact, &self.friction].map(|pass| self.depth(pass).window);
+        windows[0].max(windows[1]).div_ceil(FLOAT.initiation_interval)
+    }
+
     /// Cycles that every step takes beside load, passes and one cycle a body: the way of the last
     /// body through the integration, and the control around the step.
     #[must_use]
@@ -234,6 +264,25 @@ mod tests {
         assert_eq!(with(3, 4).check(), Ok(()));
         let error = with(3, 3).check().expect_err("a latency of 7");
         assert!(error.to_string().contains("a read latency of 7 cycles"), "{error}");
+    }
+
+    #[test]
+    fn a_queue_in_an_unchecked_build_is_refused() {
+        let with = |queue, interlocked| Parameters { queue, interlocked, ..Parameters::default() };
+        assert_eq!(with(0, false).check(), Ok(()));
+        assert_eq!(with(64, true).check(), Ok(()));
+        assert_eq!(with(64, false).check(), Err(BuildError::UncheckedQueue { queue: 64 }));
+    }
+
+    /// The timers of the queue have eight bits.
+    #[test]
+    fn the_window_of_a_queue_fits_its_timers() {
+        assert_eq!(Design::new(Parameters::default()).window_slots(), 162);
+        for inertia in FORMS {
+            let parameters =
+                Parameters { address_stages: 4, output_stages: 5, ..Parameters::with(inertia) };
+            assert!(Design::new(parameters).window_slots() <= u8::MAX.into());
+        }
     }
 
     /// Nothing waits for the given impulses of a warm pass either: they pass the address registers

@@ -2,8 +2,8 @@
 //! Verilog includes them, so that no fact is typed twice.
 
 use pgs_interface::control::{
-    self, ErrorCode, ITERATIONS_MAX, REGISTERS, channels, depth, dma, features, issue,
-    memory_per_record, numbers,
+    self, ErrorCode, ITERATIONS_MAX, QUEUE_PATIENCE, REGISTERS, channels, depth, dma, features,
+    issue, memory_per_record, numbers,
 };
 use pgs_interface::fence::Fence;
 use pgs_interface::profile::{Depth, FLOAT, Inertia, solver};
@@ -39,6 +39,7 @@ pub(super) fn interface() -> String {
             constant(text, 8, &format!("ERROR_{}", screaming(&format!("{code:?}"))), code as u32);
         }
         constant(text, 32, "ITERATIONS_MAX", ITERATIONS_MAX);
+        constant(text, 32, "QUEUE_PATIENCE", QUEUE_PATIENCE);
         constant(text, 32, "SOLVER_ROTATION_LIMIT", solver::ROTATION_LIMIT.to_bits());
         constant(text, 32, "SOLVER_SERIES_TERM", solver::SERIES_TERM.to_bits());
     })
@@ -78,6 +79,11 @@ pub(super) fn schedule(design: &Design) -> String {
             number(&format!("{name}_FILL"), depth.fill.into());
             number(&format!("{name}_WINDOW"), depth.window.into());
         }
+        let slots = parameters.queue + QUEUE_COMING;
+        number("QUEUE_DEPTH", parameters.queue.into());
+        number("QUEUE_SLOTS", slots.into());
+        number("QUEUE_SLOT_BITS", address_bits(slots));
+        number("QUEUE_WINDOW", design.window_slots().into());
         number("INTEGRATION_DEPTH", design.integration.schedule.depth.into());
         capabilities(text, design);
     })
@@ -124,7 +130,7 @@ fn capabilities(text: &mut Text, design: &Design) {
         ),
         ("DMA", dma::ADDRESS_WIDTH.put(dma::LENGTH_WIDTH.put(0, LENGTH_BITS), ADDRESS_BITS)),
         ("NUMBERS", numbers::COLLISIONS.put(0, variant.numbers.collisions as u32)),
-        ("QUEUE", 0),
+        ("QUEUE", parameters.queue),
         ("FENCE_BASE", fence_base),
         ("FENCE_SIZE", fence_size),
     ];
@@ -135,6 +141,9 @@ fn capabilities(text: &mut Text, design: &Design) {
     constant(text, 32, "BYTES_PER_COLLISION", collision);
 }
 
+/// Slots of the queue beside its depth: of collisions that have left the finder and not entered.
+/// From the issue that empties a slot to the entry of the next collision in it there are three.
+const QUEUE_COMING: u32 = 4;
 /// Width of the AXI DMAs' length registers (specification, section 5).
 pub(super) const LENGTH_BITS: u32 = 26;
 /// Width of the AXI DMAs' addresses: both parts of the ZCU102's DDR.

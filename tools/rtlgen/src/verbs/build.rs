@@ -1,9 +1,10 @@
 //! The options that describe a build of the accelerator.
 
 use clap::{Args, ValueEnum};
+use pgs_interface::control::QUEUE_MAX;
 use pgs_interface::fence::Fence;
 use pgs_interface::profile::Inertia;
-use rtlgen::design::{Design, OddReadLatency, Parameters};
+use rtlgen::design::{BuildError, Design, Parameters};
 
 /// The behaviour of the hardware on a hazard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -49,6 +50,11 @@ pub(crate) struct BuildArgs {
     /// On a hazard, wait for the velocity or read the stale one
     #[arg(long, value_enum, default_value_t = Hazards::Interlocked)]
     hazards: Hazards,
+    /// Collisions that wait in the issue queue; 0: no queue. Only an interlocked build can have one
+    /// [default: 0]
+    #[arg(long, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(0..=i64::from(QUEUE_MAX)))]
+    queue: Option<u32>,
     /// Registers in front of the velocity and impulse memories
     #[arg(long, value_name = "N", default_value_t = Parameters::default().address_stages,
           value_parser = clap::value_parser!(u32).range(1..=4))]
@@ -71,17 +77,19 @@ pub(crate) struct BuildArgs {
 
 impl BuildArgs {
     /// The design that the options describe.
-    pub(crate) fn design(&self) -> Result<Design, OddReadLatency> {
+    pub(crate) fn design(&self) -> Result<Design, BuildError> {
         let inertia = match self.inertia {
             InertiaForm::Isotropic => Inertia::Isotropic,
             InertiaForm::World => Inertia::World,
         };
         let default = Parameters::with(inertia);
+        let interlocked = self.hazards == Hazards::Interlocked;
         let parameters = Parameters {
             bodies: self.bodies.unwrap_or(default.bodies),
             collisions: self.collisions.unwrap_or(default.collisions),
             inertia,
-            interlocked: self.hazards == Hazards::Interlocked,
+            interlocked,
+            queue: self.queue.unwrap_or(if interlocked { default.queue } else { 0 }),
             address_stages: self.address_stages,
             output_stages: self.output_stages,
             smallest_normal: self.smallest_normal == SmallestNormal::Exact,

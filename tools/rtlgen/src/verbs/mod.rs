@@ -3,7 +3,7 @@
 use std::io;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use rtlgen::design::OddReadLatency;
+use rtlgen::design::BuildError;
 use rtlgen::verify;
 
 pub(crate) mod build;
@@ -21,7 +21,7 @@ pub(crate) enum Error {
     Output(#[from] io::Error),
     /// The options describe no build.
     #[error(transparent)]
-    Build(#[from] OddReadLatency),
+    Build(#[from] BuildError),
     /// A check could not be made.
     #[error(transparent)]
     Verify(#[from] verify::Error),
