@@ -37,6 +37,7 @@ impl Place {
     /// A point keeps its index where it has moved by at most `reach` metres, and is otherwise the
     /// nearest other one within it. If no point is within it, the collision is a new one.
     #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "an index of a point is below 4")]
     pub fn nearest(collision: u32, old: &Collision, new: &Collision, reach: f32) -> Self {
         let (old, new) = (used(old), used(new));
         let (mut place, mut taken) = (Self { collision, ..Self::NEW }, 0_u32);
@@ -63,7 +64,7 @@ impl Place {
 
     /// Whether a step of `limit` collisions had the place, or it is new: new ones count from -1.
     fn is_of(&self, limit: u32) -> bool {
-        let points = self.points.map(|point| point.wrapping_add(1) <= CONTACT_POINTS as u8);
+        let points = self.points.map(|point| usize::from(point.wrapping_add(1)) <= CONTACT_POINTS);
         (self.collision.wrapping_add(1) <= limit) & points[0] & points[1] & points[2] & points[3]
     }
 
@@ -230,6 +231,7 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
     }
 
     #[inline]
+    #[allow(clippy::float_cmp, reason = "equal normals have equal tangents")]
     fn impulses(&self, index: usize) -> Impulses {
         let Some(Place { collision, points }) = self.places.get(index) else {
             return Impulses::ZERO;
@@ -274,7 +276,8 @@ mod tests {
     fn collision(normal: [f32; 3], points: &[[f32; 3]]) -> Collision {
         let mut contacts = [Contact::default(); CONTACT_POINTS];
         contacts.iter_mut().zip(points).for_each(|(to, point)| to.point = *point);
-        Collision { body_a: 2, body_b: 7, normal, count: points.len() as u32, contacts }
+        let count = u32::try_from(points.len()).expect("at most four");
+        Collision { body_a: 2, body_b: 7, normal, count, contacts }
     }
 
     const IMPULSES: Impulses = Impulses { normal: [3.0, 4.0, 5.0, 6.0], friction: [0.5, -0.25] };
@@ -302,7 +305,7 @@ mod tests {
             ([0.0, 1.0, 0.0], [-0.0, 1.0, 0.0], 1.0),
         ] {
             let found = carried(old, new);
-            assert_eq!(found.normal, IMPULSES.normal);
+            assert_eq!(found.normal.map(f32::to_bits), IMPULSES.normal.map(f32::to_bits));
             let (before, after) = (world(old, IMPULSES.friction), world(new, found.friction));
             for (before, after) in before.iter().zip(after) {
                 assert!((before * sign - after).abs() < 1e-6, "{old:?} {new:?}");

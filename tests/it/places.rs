@@ -133,7 +133,7 @@ impl World {
     fn commit(&mut self, impulses: &[Impulses]) {
         self.last.commit(&self.collisions, impulses).expect("the impulses of the step");
         self.collisions.rotate_right(1);
-        self.places = (0..self.places.len() as u32).map(Place::same).collect();
+        self.places = (0..).take(self.places.len()).map(Place::same).collect();
         self.places.rotate_right(1);
     }
 

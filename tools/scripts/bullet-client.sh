@@ -45,6 +45,9 @@ attend "$client" "${scenes[@]}" > "$table" || code=$?
 cat "$table"
 echo "bullet-client: the scenes took $SECONDS s"
 [ $code = 0 ] || exit $code
+# The limits hold, too, where the board gets the places of the impulses. A single tower is chaotic.
+attend "$client" --by-place pile ratio || code=$?
+[ $code = 0 ] || exit $code
 
 if [ $# = 1 ]; then
 	awk -v table="$table" '/^```$/ { inside = 0 } !inside

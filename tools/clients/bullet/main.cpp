@@ -11,7 +11,7 @@ enum Exit { OK = 0, LIMIT = 1, USAGE = 2, SKIPPED = 77 };
 
 const char USAGE_TEXT[] =
     "usage: bullet-client [SCENE...] [--board TEXT] [--iterations N] [--points N] [--reverse N] [--cold] "
-    "[--deep N] [--ignore-properties] [--json] [--list] [--help]\n"
+    "[--by-place] [--deep N] [--ignore-properties] [--json] [--list] [--help]\n"
     "\n"
     "Runs scenes of Bullet on Bullet's own solver and on the board's, and prints both.\n"
     "Without a scene: all but `spread` and `time`.\n"
@@ -21,6 +21,8 @@ const char USAGE_TEXT[] =
     "  --points N        largest number of points of a collision, 1 to 4 (2)\n"
     "  --reverse N       reverse the order of the collisions every N steps, 0 to 1000 (3; 0 is never)\n"
     "  --cold            begin every step with impulses of 0 on the board; Bullet's own solver stays warm\n"
+    "  --by-place        give the board the place of each point in the last step, not its impulse; the limits "
+    "count\n"
     "  --deep N          speed of points deeper than the threshold, per cent of that at it, 0 to 100 (36)\n"
     "  --ignore-properties\n"
     "                    the board solves contacts without the properties that it lacks (rolling friction "
@@ -101,6 +103,8 @@ int main(int count, char **arguments) {
             json = true;
         } else if (argument == "--cold") {
             settings.solver.warmStart = false;
+        } else if (argument == "--by-place") {
+            settings.solver.byPlace = true;
         } else if (argument == "--ignore-properties") {
             settings.solver.ignoreProperties = true;
         } else if (argument == "--board" || argument == "--iterations" || argument == "--points" ||

@@ -10,6 +10,8 @@ const size_t SHAPES = 64;
 // differ by less than 2.6 degrees.
 const btScalar SAME_NORMAL = btScalar(0.999);
 const uint32_t STATIC_SHAPE = 0;
+// The numbers of storePlaces in a point, which begin again behind the last.
+const uint64_t STORES = uint64_t(1) << 30;
 
 void store(float *to, const btVector3 &vector) {
     for (int i = 0; i < 3; i++) to[i] = float(vector[i]);
@@ -199,9 +201,14 @@ void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactS
     int order[MANIFOLD_CACHE_SIZE];
     for (int i = 0; i < count; i++) order[i] = i;
     if (m_pointsPerCollision == 2 && count > 2) {
-        auto away = [manifold](int i) {
-            const btVector3 &origin = manifold->getContactPoint(0).getPositionWorldOnB();
-            return manifold->getContactPoint(i).getPositionWorldOnB().distance2(origin);
+        // With places it is the one that shared the first one's collision in the last step.
+        auto away = [this, manifold](int i) {
+            const btManifoldPoint &first = manifold->getContactPoint(0);
+            const btManifoldPoint &point = manifold->getContactPoint(i);
+            const uint64_t kept = placeOf(first), other = placeOf(point);
+            const btScalar distance = point.getPositionWorldOnB().distance2(first.getPositionWorldOnB());
+            if (kept && other) return (kept - 1) >> 2 == (other - 1) >> 2 ? btScalar(-1) : distance + 1000;
+            return distance;
         };
         std::swap(order[1], *std::min_element(order + 1, order + count,
                                               [&away](int i, int j) { return away(i) < away(j); }));
@@ -353,4 +360,36 @@ void ZynqPgsGather::storeImpulses() {
             (*point)->m_appliedImpulseLateral2 = m_impulses[at].friction[1] * share;
         }
     }
+}
+
+// A place is in m_userPersistentData of its point: the number of storePlaces in 30 bits, of the collision in
+// 32, of the point in 2, from 1 on. Bullet keeps it with the point, and a new point has 0. Points of an island
+// that slept, or was Bullet's, have that of an earlier step.
+uint64_t ZynqPgsGather::placeOf(const btManifoldPoint &point) const {
+    const uint64_t kept = reinterpret_cast<uintptr_t>(point.m_userPersistentData);
+    return m_hasPlaces && kept != 0 && (kept - 1) >> 34 == m_placesStored % STORES ? kept : 0;
+}
+
+// A collision has one place: where its points come from two collisions of the last step, those of the second
+// are new.
+void ZynqPgsGather::loadPlaces() {
+    const uint8_t none = ZPGS_NEW_POINT;
+    m_places.assign(m_collisions.size(), {ZPGS_NEW_COLLISION, {none, none, none, none}});
+    for (size_t at = 0; at < m_collisions.size(); at++)
+        for (uint32_t i = 0; i < m_collisions[at].count; i++) {
+            const uint64_t kept = placeOf(*m_points[at][i]);
+            if (kept == 0) continue;
+            const uint32_t collision = uint32_t((kept - 1) >> 2);
+            if (m_places[at].collision == ZPGS_NEW_COLLISION) m_places[at].collision = collision;
+            if (m_places[at].collision == collision) m_places[at].points[i] = uint8_t((kept - 1) & 3);
+        }
+}
+
+void ZynqPgsGather::storePlaces() {
+    m_hasPlaces = true;
+    const uint64_t step = ++m_placesStored % STORES;
+    for (size_t at = 0; at < m_points.size(); at++)
+        for (size_t i = 0; i < m_points[at].size() && m_points[at][i]; i++)
+            m_points[at][i]->m_userPersistentData =
+                reinterpret_cast<void *>((step << 34 | uint64_t(at) << 2 | uint64_t(i)) + 1);
 }

@@ -40,6 +40,12 @@ public:
     void loadImpulses(float factor, bool withFriction);
     // Stores impulses() in Bullet's points.
     void storeImpulses();
+    // Makes places() from the places that the last storePlaces has left in Bullet's points.
+    void loadPlaces();
+    // Leaves in each of Bullet's points its place in this step.
+    void storePlaces();
+    // Makes every point a new one, as where the library has lost the last step.
+    void forgetPlaces() { m_hasPlaces = false; }
     // Makes the distances of collisions() those of the second step: deep points push, others resist and may
     // close a gap. The pushes, one for each of bodies(), are 0 before that step.
     std::vector<Push> &preparePushes(const btContactSolverInfo &info);
@@ -55,6 +61,7 @@ public:
     std::vector<zpgs_collision> &collisions() { return m_collisions; }
     const std::vector<float> &frictions() const { return m_frictions; }  // parallel to collisions()
     std::vector<zpgs_impulses> &impulses() { return m_impulses; }        // parallel to collisions()
+    const std::vector<zpgs_place> &places() const { return m_places; }   // parallel to collisions()
     // True if a point is so deep that its push is one of the pose, not of the velocity.
     bool isDeep() const { return m_isDeep; }
     // True if a kinematic body in a collision moves.
@@ -72,6 +79,7 @@ private:
     uint32_t bodyOf(btCollisionObject *object, const btContactSolverInfo &info);
     uint32_t shapeOf(btScalar inverseMass, const btVector3 &inverseInertia);
     void clearGathered();
+    uint64_t placeOf(const btManifoldPoint &point) const;
 
     // Bullet's points of a collision: element i is that of contact i; the rest is null.
     using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;
@@ -88,6 +96,9 @@ private:
     std::vector<Points> m_points;
     std::vector<float> m_frictions;
     std::vector<zpgs_impulses> m_impulses;
+    std::vector<zpgs_place> m_places;
+    bool m_hasPlaces = false;
+    uint64_t m_placesStored = 0;
     std::vector<Push> m_pushes;  // parallel to m_bodies, or empty
     bool m_hasKinematic = false;
     bool m_isDeep = false;

@@ -13,6 +13,8 @@ int islandOf(const btCollisionObject *a, const btCollisionObject *b) {
     return a->getIslandTag() >= 0 ? a->getIslandTag() : b->getIslandTag();
 }
 
+bool forget(void *) { return true; }
+
 // A field of all bodies.
 zpgs_strided column(float *field) { return {field, sizeof(ZynqPgsGather::Body)}; }
 
@@ -20,6 +22,8 @@ zpgs_strided column(float *field) { return {field, sizeof(ZynqPgsGather::Body)};
 
 ZynqPgsSolver::ZynqPgsSolver(const char *board, const ZynqPgsOptions &options)
     : m_boardText(board), m_options(options), m_gather(options.pointsPerCollision, options.deepShare) {
+    // Without a callback Bullet leaves the data of a removed point in its slot, where it expects none later.
+    if (options.byPlace && !gContactDestroyedCallback) gContactDestroyedCallback = forget;
     open();
 }
 
@@ -27,6 +31,7 @@ ZynqPgsSolver::~ZynqPgsSolver() { zpgs_close(m_board); }
 
 bool ZynqPgsSolver::open() {
     m_hasShapes = false;
+    m_gather.forgetPlaces();
     m_boardImpulses = Impulses::Unknown;
     return !failed(zpgs_open(m_boardText.c_str(), &m_board));
 }
@@ -158,7 +163,12 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     collisions.size = sizeof collisions;
     collisions.count = pairs.size();
     collisions.collisions = {pairs.data(), sizeof pairs[0]};
-    collisions.impulses = {m_gather.impulses().data(), sizeof(zpgs_impulses)};
+    if (m_options.byPlace) {
+        collisions.places = m_gather.places().data();
+        collisions.factor = float(info.m_warmstartingFactor);
+    } else {
+        collisions.impulses = {m_gather.impulses().data(), sizeof(zpgs_impulses)};
+    }
 
     zpgs_report report = {};
     report.size = sizeof report;
@@ -174,7 +184,11 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     const bool pushes = m_gather.isDeep();
     if (pushes && status == ZPGS_STATUS_OK) status = push(info, bodies, collisions, parameters, pushReport);
     m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
+    // The last thing that can fail: of a step that fails the library keeps nothing.
+    const bool commits = m_options.byPlace && parameters.impulses_out && status == ZPGS_STATUS_OK;
+    if (commits) status = zpgs_commit(m_board, &collisions);
     if (failed(status)) return false;
+    if (commits) m_gather.storePlaces();
     m_counts.boardSteps++;
     m_counts.pushSteps += pushes;
     m_counts.pushReport = pushReport;
@@ -195,6 +209,7 @@ void ZynqPgsSolver::loadImpulses(const btContactSolverInfo &info, zpgs_parameter
     const bool warm = has && (info.m_solverMode & SOLVER_USE_WARMSTARTING);
     parameters.warm_start = warm;
     parameters.impulses_out = has;
+    if (m_options.byPlace) m_gather.loadPlaces();
     m_gather.loadImpulses(warm ? float(info.m_warmstartingFactor) : 0.0f, m_frictionIsBoards);
 }
 
@@ -227,6 +242,7 @@ zpgs_status ZynqPgsSolver::push(const btContactSolverInfo &info, zpgs_bodies bod
     bodies.linear_velocities = {pushes[0].linear, sizeof pushes[0]};
     bodies.angular_velocities = {pushes[0].angular, sizeof pushes[0]};
     collisions.impulses = {};
+    collisions.places = nullptr;
     // It takes as many passes as the first, all of contact.
     parameters.contact_iterations =
         std::min(parameters.contact_iterations + parameters.friction_iterations, MOST_PASSES);

@@ -36,6 +36,9 @@ struct ZynqPgsOptions {
     // (SOLVER_USE_WARMSTARTING, which is Bullet's default), and stores its own in Bullet's points. Costs a
     // pass of each kind. A board without impulses does without.
     bool warmStart = true;
+    // The library keeps the impulses, and a point its place in the last step, in m_userPersistentData. Without
+    // it the impulses come by value, from Bullet's points. Not for a program with data of its own there.
+    bool byPlace = false;
     // The board solves islands, too, whose contacts have a property that no board has (rolling friction and
     // others, ZynqPgsGather::property), and leaves the property out.
     bool ignoreProperties = false;
