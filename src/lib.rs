@@ -118,10 +118,12 @@ pub use error::Error;
 pub use fault::Fault;
 pub use pgs_interface as interface;
 pub use scene::{
-    Bodies, Body, Collision, Collisions, Contact, Impulses, LastStep, Place, Pose, Shape,
-    StepParameters, Velocity, WarmCollisions,
+    Bodies, Body, Collision, Collisions, Contact, Impulses, Pose, Shape, StepParameters, Velocity,
+    WarmCollisions,
 };
-pub use step::{Accelerator, Detached, InFlight, Prepared, StepReport};
+pub use step::{
+    Accelerator, Detached, InFlight, LastStep, Place, PlacedCollisions, Prepared, StepReport,
+};
 pub use validate::InputError;
 
 /// The examples of the documents, which are tests.

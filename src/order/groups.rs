@@ -18,7 +18,7 @@
 //! slots stay empty.
 
 use super::schedule::EMPTY;
-use super::tail::Tail;
+use super::tail::{Listed, Tail};
 use super::{IssueWindow, OrderError, OrderInput, Schedule};
 
 /// Number of groups that a depth is divided into.
@@ -27,15 +27,6 @@ const PARTS: usize = 8;
 const GROUPS: usize = u64::BITS as usize;
 /// Largest number of waiting collisions.
 const WAITING_MAX: usize = 256;
-
-/// A collision that waits for its place.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Listed {
-    /// Its bodies, and for a static one the number of all bodies.
-    pub(super) bodies: [u32; 2],
-    /// Its index in the given order.
-    index: u32,
-}
 
 /// Which groups are closed for a body: bit `i` is group `base + i`.
 #[derive(Debug, Clone, Copy, Default)]

@@ -5,12 +5,19 @@
 //! for the busier of its bodies. Only the last few thousand collisions move: all others stand early
 //! enough.
 
-use super::groups::Listed;
-
 /// Collisions are brought forward within this number of depths from the end.
 const DEPTHS: usize = 16;
 /// Depths beyond a body's own need: its neighbours need theirs in between.
 const SLACK: usize = 4;
+
+/// A collision that waits for its place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Listed {
+    /// Its bodies, and for a static one the number of all bodies.
+    pub(super) bodies: [u32; 2],
+    /// Its index in the given order.
+    pub(super) index: u32,
+}
 
 /// Memory for the tail of a list.
 #[derive(Debug, Default)]

@@ -6,6 +6,7 @@ mod echo;
 mod flight;
 mod impulses;
 mod in_flight;
+mod last_step;
 mod locate;
 mod ordering;
 mod pack;
@@ -27,6 +28,7 @@ pub(crate) use accelerator::find;
 pub use detached::Detached;
 pub(crate) use echo::{ECHO_LIMIT, Echo, EchoResult, FillPattern, source_of};
 pub use in_flight::InFlight;
+pub use last_step::{LastStep, Place, PlacedCollisions};
 pub use prepared::Prepared;
 pub use report::{HostTimes, Limit, OrderChoice, StepCycles, StepReport};
 #[cfg(feature = "bench")]

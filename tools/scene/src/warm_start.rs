@@ -1,6 +1,6 @@
 //! Carries impulses from one step of a scene to the next.
 
-use zynq_pgs::scene::PlacedCollisions;
+use zynq_pgs::PlacedCollisions;
 use zynq_pgs::{Collision, Impulses, InputError, LastStep, Place};
 
 /// Largest way of a contact point in a step, m: one that has moved farther is a new one.

@@ -5,7 +5,6 @@ use std::ptr::NonNull;
 use std::slice;
 
 use crate::failure::Failure;
-use crate::handle::AcceleratorHandle;
 
 /// The address, if it is neither null nor misaligned.
 pub(super) fn checked<T>(pointer: *const T, name: &str) -> Result<NonNull<T>, Failure> {
@@ -28,9 +27,7 @@ pub(super) fn misaligned(name: &str, address: usize, alignment: usize) -> Failur
 /// # Safety
 /// The pointer is null, or [`open_into`] has given it and [`close`] has not had it; no other thread
 /// closes it before the reference ends.
-pub(crate) unsafe fn handle<'a>(
-    pointer: *const AcceleratorHandle,
-) -> Result<&'a AcceleratorHandle, Failure> {
+pub(crate) unsafe fn handle<'a, T>(pointer: *const T) -> Result<&'a T, Failure> {
     let pointer = checked(pointer, "accelerator")?;
     // SAFETY: not null and aligned, as checked. The box of `open_into` lives until `close`, which
     // the caller has not called. References to a handle are shared: nothing makes an exclusive one.
@@ -41,9 +38,9 @@ pub(crate) unsafe fn handle<'a>(
 ///
 /// # Safety
 /// `out` is null, or leads to memory for a pointer that no other thread reads or writes.
-pub(crate) unsafe fn open_into(
-    out: *mut *mut AcceleratorHandle,
-    open: impl FnOnce() -> Result<AcceleratorHandle, Failure>,
+pub(crate) unsafe fn open_into<T>(
+    out: *mut *mut T,
+    open: impl FnOnce() -> Result<T, Failure>,
 ) -> Result<(), Failure> {
     let out = checked(out, "handle to store")?;
     // SAFETY: not null and aligned, as checked; the caller promises memory for a pointer.
@@ -72,7 +69,7 @@ pub(crate) unsafe fn store<T>(out: *mut T, name: &str, value: T) -> Result<(), F
 ///
 /// # Safety
 /// As [`handle`], and no other call uses the handle now or later.
-pub(crate) unsafe fn close(pointer: *mut AcceleratorHandle) -> Result<(), Failure> {
+pub(crate) unsafe fn close<T>(pointer: *mut T) -> Result<(), Failure> {
     if !pointer.is_null() {
         let pointer = checked(pointer, "accelerator")?;
         // SAFETY: `open_into` took the pointer out of a box, and the caller closes it once.

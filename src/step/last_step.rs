@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::impulses::Impulses;
-use super::tangents::tangents;
-use super::{CONTACT_POINTS, Collision, Collisions, Contact, Structures};
+use crate::scene::{
+    CONTACT_POINTS, Collision, Collisions, Contact, Impulses, Structures, tangents,
+};
 use crate::simd::prefetch;
 use crate::validate::InputError;
 
