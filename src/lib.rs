@@ -107,7 +107,7 @@ pub mod report {
     pub use crate::step::{HostTimes, Limit, OrderChoice, StepCycles};
 }
 
-pub use beat::pack::writer::Writer;
+pub use beat::writer::Writer;
 /// The emulated board itself: its configuration, its builder's handle, violations, faults.
 #[cfg(feature = "emulation")]
 pub use bitstream_model as model;
@@ -118,7 +118,7 @@ pub use error::Error;
 pub use fault::Fault;
 pub use pgs_interface as interface;
 pub use scene::{
-    Bodies, Body, Collision, Collisions, Contact, ContactMemory, Impulses, Pose, Shape,
+    Bodies, Body, Collision, Collisions, Contact, Impulses, LastStep, Place, Pose, Shape,
     StepParameters, Velocity, WarmCollisions,
 };
 pub use step::{Accelerator, Detached, InFlight, Prepared, StepReport};

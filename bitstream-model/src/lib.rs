@@ -28,7 +28,7 @@ pub use config::quirks::{Coherency, InterruptWiring, Master, Quirks, Resettable}
 pub use config::{Bandwidth, BoardConfig, ConfigError, Delays, Hazards, THREADS_MAX};
 pub use fault::{Consequence, Fault, FaultError, FaultKind, FaultPlan, Place, StepPhase, When};
 pub use handle::{CpuPort, EmulatedBoard};
-pub use memory::external::DeviceMemory;
+pub use memory::external::{ByteMemory, DeviceMemory};
 pub use memory::{Denied, DeviceAccess, MemoryError};
 pub use pgs_interface as interface;
 pub use pgs_interface::axi_dma::Direction;

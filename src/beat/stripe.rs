@@ -25,15 +25,13 @@
 
 use pgs_interface::number::StreamFormat;
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{LANES, collision, pose, result};
+use pgs_interface::record::{collision, pose, result};
 use pgs_interface::stripe::Stripe;
 
-use crate::simd::Lanes;
-
 /// Records of a block. The number is divisible by the records of a group of every stripe, so that
-/// each block begins with a group. A block and the collisions that are prefetched meanwhile fit in
-/// the L1 cache.
-pub(crate) const BLOCK: usize = 30;
+/// each block begins with a group. A block, its beats, and the collisions that are prefetched
+/// meanwhile fit in the L1 cache.
+pub(crate) const BLOCK: usize = 60;
 
 /// The records that a segment carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,7 +109,7 @@ impl Layout {
 
     /// Where a beat of the segment goes.
     ///
-    /// This is the definition. The packer and the reader work without its divisions, and tests hold
+    /// This is the definition. The dealer and the joiner work without its divisions, and tests hold
     /// both against it.
     pub(crate) fn place(&self, beat: usize) -> Place {
         let group = self.stripe.streams;
@@ -134,45 +132,6 @@ impl Layout {
 /// Beats of a group, or of a part of one, that go to a channel.
 fn share(group: &[u8], channel: usize) -> usize {
     group.iter().filter(|stream| usize::from(**stream) == channel).count()
-}
-
-/// The channels of a segment's beats in their order.
-#[derive(Debug)]
-pub(super) struct Deal {
-    group: &'static [u8],
-    at: usize,
-}
-
-impl Deal {
-    /// Begins with the first beat.
-    pub(super) const fn new(stripe: Stripe) -> Self {
-        Self { group: stripe.streams, at: 0 }
-    }
-
-    /// The channel of the next beat.
-    #[inline(always)]
-    pub(super) fn next(&mut self) -> usize {
-        let channel = usize::from(self.group[self.at]);
-        self.at += 1;
-        if self.at == self.group.len() {
-            self.at = 0;
-        }
-        channel
-    }
-
-    /// Whether the group is whole.
-    #[inline(always)]
-    pub(super) const fn at_end_of_group(&self) -> bool {
-        self.at == 0
-    }
-}
-
-// A row of f32 is a beat.
-const _: () = assert!(LANES * 4 == pgs_interface::record::BEAT_BYTES);
-
-/// The sum of the lanes' sums.
-pub(crate) fn total(sum: Lanes) -> u32 {
-    sum.words().into_iter().fold(0, u32::wrapping_add)
 }
 
 #[cfg(test)]
@@ -282,6 +241,12 @@ mod tests {
                 );
                 assert!(streams.iter().all(|stream| usize::from(*stream) < channels));
             }
+            for segment in SEGMENTS {
+                let layout = segment.layout(&variant);
+                let (beats, group) = (layout.beats(BLOCK), layout.stripe.streams.len());
+                assert!(beats.is_multiple_of(group), "{} {segment:?}", profile.name);
+                assert_eq!(beats * layout.rows_per_beat(), BLOCK * layout.rows);
+            }
             let layout = Collisions.layout(&variant);
             let issue = profile.collisions_per_issue as usize;
             for records in 0..=2 * issue {
@@ -303,12 +268,9 @@ mod tests {
             let layout = segment.layout(&Variant { inertia, ..profile.default_variant() });
             let beats = layout.beats(records);
             let mut places: Vec<_> = (0..beats).map(|beat| layout.place(beat)).collect();
-            let mut deal = Deal::new(layout.stripe);
             for (beat, place) in places.iter().enumerate() {
-                prop_assert_eq!(deal.next(), place.channel);
                 prop_assert_eq!(layout.beat_at(*place), beat);
             }
-            prop_assert_eq!(deal.at_end_of_group(), beats % layout.stripe.streams.len() == 0);
             places.sort_unstable();
             let mut every_slot = Vec::new();
             for channel in 0..profile.mm2s_widths.len() {

@@ -15,7 +15,7 @@ use super::plan::{Plan, bytes};
 use super::port::Port;
 use super::symptom::{Symptom, control_block_reset};
 use crate::axi_dma::{Dmacr, Dmasr, largest_piece, reset_core};
-use crate::beat::pack::pool::PackPool;
+use crate::beat::pool::PackPool;
 use crate::control_block::{Capabilities, Control, Fingerprint, StepArguments, identify};
 use crate::error::OpenError;
 use crate::fault::Fault;
@@ -289,6 +289,7 @@ impl Device {
             collisions: count(plan.collisions),
             parameters,
             streamed_masses: plan.streamed_masses,
+            in_order: self.capabilities.queue > 0 && !plan.queued,
         };
         self.control.set_arguments(&arguments);
         // Buffers and descriptors must be visible before the first doorbell.

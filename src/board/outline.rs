@@ -57,7 +57,8 @@ mod tests {
     fn outline(variant: pgs_interface::profile::Variant, collisions: usize) -> Outline {
         let passes = Passes { contact: 3, friction: 2, ..Passes::default() };
         // One beat a descriptor.
-        let plan = Plan { bodies: 8, collisions, passes, variant, streamed_masses: false };
+        let queued = false;
+        let plan = Plan { bodies: 8, collisions, passes, variant, streamed_masses: false, queued };
         Outline::new(&plan, 16)
     }
 

@@ -14,6 +14,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use pgs_interface::control;
 use pgs_interface::profile::Variant;
 use pgs_interface::record::BEAT_BYTES;
 use pgs_interface::stripe::IMPULSES_STREAM;
@@ -28,6 +29,8 @@ use crate::scene::{Passes, StepParameters};
 const SLOWEST_BYTES_PER_MICROSECOND: u64 = 100;
 /// Beats to which segments are aligned: 64 bytes.
 const ALIGNMENT: usize = 64 / BEAT_BYTES;
+/// Collisions whose numbers share a beat.
+pub(crate) const NUMBERS_PER_BEAT: usize = control::NUMBERS_PER_BEAT as usize;
 
 /// The number and layout of the records that a step streams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +45,9 @@ pub(crate) struct Plan {
     /// Whether the velocity records bring the inverse masses, because the shapes do not fit the
     /// table.
     pub(crate) streamed_masses: bool,
+    /// Whether the collisions go through the issue queue. Their numbers then come out with the
+    /// impulses.
+    pub(crate) queued: bool,
 }
 
 /// Where the segments lie in the buffer of one MM2S channel, beats.
@@ -115,7 +121,11 @@ impl Plan {
 
     /// Beats of impulses on one S2MM channel, in front of the results.
     pub(crate) fn impulses(&self, channel: usize) -> usize {
-        if channel == IMPULSES_STREAM { self.collisions * self.passes.kinds_out() } else { 0 }
+        if channel != IMPULSES_STREAM {
+            return 0;
+        }
+        let numbers = if self.queued { self.collisions.div_ceil(NUMBERS_PER_BEAT) } else { 0 };
+        (self.collisions + numbers) * self.passes.kinds_out()
     }
 
     /// The layout of the results.
@@ -205,6 +215,7 @@ mod tests {
         passes: PASSES,
         variant: FLOAT.default_variant(),
         streamed_masses: false,
+        queued: false,
     };
     const PASSES: Passes = Passes { contact: 4, friction: 4, warm: false, impulses_out: false };
 
@@ -250,6 +261,10 @@ mod tests {
         assert_eq!(warm.bytes_from_device(), 16 * (4 * bodies + 2 * collisions as u64));
         assert_eq!((warm.impulses(0), warm.impulses(3)), (2 * collisions, 0));
         assert!((0..4).all(|channel| warm.descriptors(channel, 67_108_800) == 12));
+        // Through the queue a beat of numbers for four collisions: 31,936 and one for the last two.
+        let queued = Plan { queued: true, ..warm };
+        assert_eq!((queued.impulses(0), queued.impulses(3)), (2 * (collisions + 31_937), 0));
+        assert_eq!(queued.results(0), queued.impulses(0) + 38_881);
         let contact_alone = Passes { friction: 0, ..passes };
         let plan = Plan { passes: contact_alone, ..FOUR };
         assert_eq!((plan.impulses(0), plan.segments(3).warm_friction), (collisions, None));

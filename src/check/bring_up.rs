@@ -124,10 +124,14 @@ fn identity(window: &Window, lines: &mut Lines) -> Option<Capabilities> {
         lines.stop(Line::Capabilities, Outcome::failed(found, expected, next));
         return None;
     }
+    let queue = match capabilities.queue {
+        0 => String::new(),
+        depth => format!(", an issue queue of {depth} collisions"),
+    };
     lines.ok(
         Line::Capabilities,
         format!(
-            "profile {}, {} kHz, up to {} bodies and {} shapes",
+            "profile {}, {} kHz, up to {} bodies and {} shapes{queue}",
             described(&capabilities.variant),
             capabilities.clock_khz,
             capabilities.body_capacity,

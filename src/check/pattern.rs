@@ -8,7 +8,6 @@
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 use pgs_interface::record::{Beat, LANES, WORD_LANE, result};
-use pgs_support::chunks::Chunks;
 
 use crate::axi_dma::Direction;
 use crate::beat::stripe::{Layout, Segment};
@@ -76,7 +75,7 @@ impl Pattern {
             if self.results.rows_per_beat() == 1 {
                 of.map(Beat).into_iter().for_each(&mut put);
             } else {
-                let (pairs, _) = of.split_arrays::<2>();
+                let (pairs, _) = of.as_chunks::<2>();
                 pairs.iter().map(pair).for_each(&mut put);
             }
         }

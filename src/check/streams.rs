@@ -10,7 +10,7 @@ use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
 use super::report::{Line, Lines, Outcome};
 use crate::axi_dma::{Direction, DmaError};
-use crate::beat::unpack::results::sum_of_words;
+use crate::beat::deal::sum_of_words;
 use crate::board::BoardKind;
 use crate::error::Error;
 use crate::fault::{ChannelState, Fault};

@@ -30,6 +30,8 @@ pub(crate) struct StepArguments<'a> {
     pub(crate) parameters: &'a StepParameters,
     /// Whether the bodies bring their masses; else the shape table has them.
     pub(crate) streamed_masses: bool,
+    /// Whether the collisions pass by the issue queue of a board that has one.
+    pub(crate) in_order: bool,
 }
 
 /// The argument registers of a step and their values.
@@ -55,13 +57,14 @@ fn registers_of(arguments: &StepArguments<'_>) -> [(Register, u32); ARGUMENTS] {
 
 /// The switches of a step.
 fn flags_of(arguments: &StepArguments<'_>) -> u32 {
-    let StepArguments { parameters, streamed_masses, .. } = *arguments;
+    let StepArguments { parameters, streamed_masses, in_order, .. } = *arguments;
     let word = flags::INTEGRATE.put(0, parameters.integrate.into());
     let word = flags::KINEMATIC.put(word, parameters.kinematic.into());
     let word = flags::PAIR_FRICTION.put(word, parameters.pair_friction.into());
     let word = flags::WARM_START.put(word, parameters.warm_start.into());
     let word = flags::IMPULSES_OUT.put(word, parameters.impulses_out.into());
-    flags::STREAMED_MASSES.put(word, streamed_masses.into())
+    let word = flags::STREAMED_MASSES.put(word, streamed_masses.into());
+    flags::IN_ORDER.put(word, in_order.into())
 }
 
 /// The accelerator's control block.
@@ -148,7 +151,8 @@ mod tests {
 
     /// Two bodies and a collision.
     fn step(parameters: &StepParameters) -> StepArguments<'_> {
-        StepArguments { bodies: 2, collisions: 1, parameters, streamed_masses: false }
+        let (streamed_masses, in_order) = (false, false);
+        StepArguments { bodies: 2, collisions: 1, parameters, streamed_masses, in_order }
     }
 
     #[test]
@@ -175,6 +179,8 @@ mod tests {
         assert_eq!(word(none.with_pair_friction(true)), 0b100);
         let masses = StepArguments { streamed_masses: true, ..step(&none) };
         assert_eq!(flags_of(&masses), 0b010_0000);
+        let in_order = StepArguments { in_order: true, ..step(&none) };
+        assert_eq!(flags_of(&in_order), 0b100_0000);
     }
 
     #[test]

@@ -5,9 +5,9 @@ use pgs_interface::axi_dma::{LENGTH_WIDTH_MAX, LENGTH_WIDTH_MIN};
 use pgs_interface::control::{
     BODY_CAPACITY, CHANNELS, CLOCK_KHZ, COLLISION_CAPACITY, CONTACT_DEPTH, DMA, FEATURES,
     FENCE_BASE, FENCE_SIZE, FRICTION_DEPTH, IDENTIFICATION, IDENTIFICATION_VALUE, ISSUE,
-    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, PROFILE, S2MM_WIDTHS, SHAPE_CAPACITY,
-    SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, channels, depth, dma, features, issue,
-    memory_per_record, numbers, version,
+    MEMORY_BYTES, MEMORY_PER_RECORD, MM2S_WIDTHS, NUMBERS, PROFILE, QUEUE, QUEUE_MAX, S2MM_WIDTHS,
+    SHAPE_CAPACITY, SHAPE_STRIDE, SHAPE_TABLE, VERSION, VERSION_MAJOR, channels, depth, dma,
+    features, issue, memory_per_record, numbers, version,
 };
 use pgs_interface::fence::Fence;
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
@@ -27,6 +27,9 @@ pub struct Capabilities {
     pub version: (u32, u32),
     /// Whether the pipeline waits on a hazard; without it, it reads stale velocities.
     pub interlocked: bool,
+    /// Depth of the issue queue, collisions: the board issues the oldest one that is free of
+    /// hazards. 0: none, collisions enter the pipeline in the order sent.
+    pub queue: u32,
     /// Streams into the accelerator.
     pub mm2s_channels: usize,
     /// Streams out of the accelerator.
@@ -171,6 +174,11 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     let able = checked(window, &FEATURES, "isotropic inertia, as the profile has it", |word| {
         profile.world.is_some() || !features::WORLD_INERTIA.is_set(word)
     })?;
+    let interlocked = features::INTERLOCKED.is_set(able);
+    let queue =
+        checked(window, &QUEUE, "0 to 256, and 0 where the pipeline does not wait", |depth| {
+            depth <= if interlocked { QUEUE_MAX } else { 0 }
+        })?;
     let world = features::WORLD_INERTIA.is_set(able);
     let variant = Variant {
         profile,
@@ -199,7 +207,8 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
     Ok(Capabilities {
         variant,
         version: (major, minor),
-        interlocked: features::INTERLOCKED.is_set(able),
+        interlocked,
+        queue,
         mm2s_channels: channels::MM2S.of(streams) as usize,
         s2mm_channels: channels::S2MM.of(streams) as usize,
         initiation_interval: issue::INTERVAL.of(interval),
@@ -311,6 +320,7 @@ pub(crate) mod fake {
                 (0x13C, (16 << 16) | 24),
                 (0x140, (40 << 8) | 26),
                 (0x144, 0),
+                (0x148, 0),
             ]);
         });
     }
@@ -356,6 +366,17 @@ mod tests {
     }
 
     #[test]
+    fn a_queue_belongs_to_a_pipeline_that_waits() {
+        let depth = |changes: &[(u32, u32)]| identify_with(changes).map(|found| found.queue);
+        assert_eq!(depth(&[]).expect("well formed"), 0);
+        assert_eq!(depth(&[(0x148, 64)]).expect("well formed"), 64);
+        assert_eq!(depth(&[(0x148, 256)]).expect("well formed"), 256);
+        assert_eq!(depth(&[(0x10C, 0)]).expect("unchecked"), 0);
+        let error = depth(&[(0x10C, 0), (0x148, 1)]).expect_err("unchecked, with a queue");
+        assert!(error.to_string().starts_with("QUEUE is 0x00000001"), "{error}");
+    }
+
+    #[test]
     fn another_design_and_another_major_version_are_refused() {
         assert!(matches!(
             identify_with(&[(0x100, 0x1234)]),
@@ -397,6 +418,7 @@ mod tests {
             (0x13C, 24, "MEMORY_PER_RECORD"),
             (0x140, (40 << 8) | 7, "DMA"),
             (0x140, (31 << 8) | 26, "DMA"),
+            (0x148, 257, "QUEUE is 0x00000101, expected 0 to 256"),
             // A size that no address decoder has, and a base beside it.
             (0x154, 3, "FENCE_SIZE"),
             (0x154, 0x8_0001, "FENCE_SIZE"),

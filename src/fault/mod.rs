@@ -85,6 +85,23 @@ pub enum Fault {
         /// The first such collision.
         collision: usize,
     },
+    /// The numbers beside the impulses of an issue queue name a collision twice, or one that does
+    /// not exist.
+    #[error(
+        "expected each of {collisions} collisions once among the impulses of the {kind} passes, \
+         found number {number} at place {at}, {}: the bitstream's issue queue is wrong; choose \
+         the order as given, which passes by the queue", number_text(*number, *collisions)
+    )]
+    ImpulseNumber {
+        /// The kind of passes: contact or friction.
+        kind: &'static str,
+        /// Place in the order of issue, from 0.
+        at: usize,
+        /// The number found there.
+        number: usize,
+        /// Collisions sent.
+        collisions: usize,
+    },
     /// Registers read all ones.
     #[error(
         "{region} reads all ones: is the bitstream still loaded, its power on and its clock \
@@ -134,6 +151,10 @@ fn behind_text(behind: Option<ChannelName>) -> String {
     behind.map(|channel| format!(", where {channel} is behind the others")).unwrap_or_default()
 }
 
+fn number_text(number: usize, collisions: usize) -> &'static str {
+    if number < collisions { "for the second time" } else { "which no collision has" }
+}
+
 fn way(direction: Direction) -> &'static str {
     match direction {
         Direction::Mm2s => "to the accelerator",
@@ -154,6 +175,7 @@ impl Fault {
             Self::Checksum { .. } => "checksum",
             Self::NotFinite { .. } => "not-finite",
             Self::ImpulseNotFinite { .. } => "impulse-not-finite",
+            Self::ImpulseNumber { .. } => "impulse-number",
             Self::Gone { .. }
             | Self::Core(DmaError::Gone { .. })
             | Self::Control(ControlError::Gone) => "gone",

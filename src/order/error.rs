@@ -25,17 +25,6 @@ pub enum OrderError {
         most: u32,
     },
 
-    /// Arrays of different lengths.
-    #[error(
-        "found {moving} entries of `moving` and {positions} positions: give one of each per body"
-    )]
-    UnequalLengths {
-        /// Entries of `moving`.
-        moving: usize,
-        /// Entries of `positions`.
-        positions: usize,
-    },
-
     /// More bodies or collisions than an order can count.
     #[error("found {found} {what}, at most {most} can be ordered")]
     TooMany {

@@ -1,4 +1,4 @@
-//! Places swept collisions in issue slots so that no hazard can occur.
+//! Places collisions in issue slots so that no hazard can occur, near to where they were given.
 //!
 //! Slots are taken in groups of an eighth of the depth. A body is used at most once in any nine
 //! groups in a row. A whole depth therefore lies between two uses, wherever in their groups they
@@ -18,8 +18,8 @@
 //! slots stay empty.
 
 use super::schedule::EMPTY;
-use super::sweep::Swept;
-use super::{IssueWindow, OrderError, Schedule};
+use super::tail::Tail;
+use super::{IssueWindow, OrderError, OrderInput, Schedule};
 
 /// Number of groups that a depth is divided into.
 const PARTS: usize = 8;
@@ -27,6 +27,15 @@ const PARTS: usize = 8;
 const GROUPS: usize = u64::BITS as usize;
 /// Largest number of waiting collisions.
 const WAITING_MAX: usize = 256;
+
+/// A collision that waits for its place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Listed {
+    /// Its bodies, and for a static one the number of all bodies.
+    pub(super) bodies: [u32; 2],
+    /// Its index in the given order.
+    index: u32,
+}
 
 /// Which groups are closed for a body: bit `i` is group `base + i`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,38 +56,46 @@ impl Closed {
 /// Memory of the placement. It is kept from order to order.
 #[derive(Debug, Default)]
 pub(super) struct Groups {
-    /// By rank. The last one is for all static bodies, and never closed.
+    list: Vec<Listed>,
+    tail: Tail,
+    /// The last one is for all static bodies, and never closed.
     bodies: Vec<Closed>,
-    waiting: Vec<Swept>,
+    waiting: Vec<Listed>,
 }
 
 impl Groups {
-    /// Places every collision of the sweep.
+    /// Places every collision with contact points of an input that was checked.
     ///
     /// # Errors
     /// [`OrderError::TooLong`] if the placement takes more than `limit` entries.
     pub(super) fn place(
         &mut self,
-        sweep: &[Swept],
-        static_rank: u32,
+        input: &OrderInput<'_>,
         window: IssueWindow,
         limit: usize,
         schedule: &mut Schedule,
     ) -> Result<(), OrderError> {
+        #[allow(clippy::cast_possible_truncation, reason = "an index of a body is a u32: checked")]
+        let fixed = input.moving.len() as u32;
+        let number = |body: u32| if input.moving[body as usize] { body } else { fixed };
+        self.list.clear();
+        let listed = |(index, pair): (u32, [u32; 2])| Listed { bodies: pair.map(number), index };
+        self.list.extend(input.taking_part().map(listed));
+        self.tail.bring_forward(&mut self.list, window.entries(), fixed);
         self.bodies.clear();
-        self.bodies.resize(static_rank as usize + 1, Closed::default());
+        self.bodies.resize(fixed as usize + 1, Closed::default());
         self.waiting.clear();
         schedule.clear();
         let too_long =
-            OrderError::TooLong { depth: window.depth(), limit, collisions: sweep.len() };
-        let mut open = Open::new(window, static_rank, &mut self.bodies, &mut schedule.entries);
-        for swept in sweep {
+            OrderError::TooLong { depth: window.depth(), limit, collisions: self.list.len() };
+        let mut open = Open::new(window, fixed, &mut self.bodies, &mut schedule.entries);
+        for listed in &self.list {
             while open.first_is_full() {
                 open.advance();
                 open.retry(&mut self.waiting);
             }
-            if !open.place(swept) {
-                self.waiting.push(*swept);
+            if !open.place(listed) {
+                self.waiting.push(*listed);
                 while self.waiting.len() > WAITING_MAX {
                     open.advance();
                     open.retry(&mut self.waiting);
@@ -99,7 +116,7 @@ impl Groups {
         while entries.last() == Some(&EMPTY) {
             entries.pop();
         }
-        schedule.empty = entries.len() - sweep.len();
+        schedule.empty = entries.len() - self.list.len();
         if entries.len() > limit { Err(too_long) } else { Ok(()) }
     }
 }
@@ -120,7 +137,7 @@ struct Open<'a> {
     start: usize,
     /// Number of entries taken in each group, by its number modulo 64.
     taken: [u32; GROUPS],
-    static_rank: usize,
+    fixed: usize,
     bodies: &'a mut [Closed],
     entries: &'a mut Vec<u32>,
 }
@@ -128,7 +145,7 @@ struct Open<'a> {
 impl<'a> Open<'a> {
     fn new(
         window: IssueWindow,
-        static_rank: u32,
+        fixed: u32,
         bodies: &'a mut [Closed],
         entries: &'a mut Vec<u32>,
     ) -> Self {
@@ -148,7 +165,7 @@ impl<'a> Open<'a> {
             base: 0,
             start: 0,
             taken: [0; GROUPS],
-            static_rank: static_rank as usize,
+            fixed: fixed as usize,
             bodies,
             entries,
         }
@@ -173,8 +190,8 @@ impl<'a> Open<'a> {
 
     /// Places a collision in the first group that can take it, if there is one.
     #[inline]
-    fn place(&mut self, swept: &Swept) -> bool {
-        let [a, b] = swept.ranks.map(|rank| rank as usize);
+    fn place(&mut self, listed: &Listed) -> bool {
+        let [a, b] = listed.bodies.map(|body| body as usize);
         let closed = [self.bodies[a].from(self.base), self.bodies[b].from(self.base)];
         let free = !(closed[0] | closed[1] | self.full);
         if free == 0 {
@@ -189,9 +206,9 @@ impl<'a> Open<'a> {
         let around = around as u64;
         self.bodies[a] = Closed { groups: closed[0] | around, base: self.base };
         self.bodies[b] = Closed { groups: closed[1] | around, base: self.base };
-        self.bodies[self.static_rank] = Closed::default();
+        self.bodies[self.fixed] = Closed::default();
         let taken = &mut self.taken[ring(self.base + u64::from(group))];
-        self.entries[self.start + group as usize * self.size + *taken as usize] = swept.index;
+        self.entries[self.start + group as usize * self.size + *taken as usize] = listed.index;
         *taken += 1;
         if *taken as usize == self.size {
             self.full |= 1 << group;
@@ -200,8 +217,8 @@ impl<'a> Open<'a> {
     }
 
     /// Tries the waiting collisions again, in their order.
-    fn retry(&mut self, waiting: &mut Vec<Swept>) {
-        waiting.retain(|swept| !self.place(swept));
+    fn retry(&mut self, waiting: &mut Vec<Listed>) {
+        waiting.retain(|listed| !self.place(listed));
     }
 }
 

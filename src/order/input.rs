@@ -1,4 +1,4 @@
-//! The input of an order: pairs of bodies, which bodies move, and their positions.
+//! The input of an order: pairs of bodies, and which bodies move.
 
 use pgs_support::float_env::standard;
 
@@ -13,15 +13,13 @@ pub struct OrderInput<'a> {
     pub pairs: &'a [[u32; 2]],
     /// Whether each body moves. A static body causes no hazard.
     pub moving: &'a [bool],
-    /// Centres of mass, world frame, m.
-    pub positions: &'a [[f32; 3]],
 }
 
 impl OrderInput<'_> {
     /// The pair of a collision without contact points. No body has such an index.
     ///
-    /// [`Order::AsGiven`](super::Order::AsGiven) leaves its entry empty, every other order leaves
-    /// it out.
+    /// [`Order::AsGiven`](super::Order::AsGiven) leaves its entry empty,
+    /// [`Order::HazardFree`](super::Order::HazardFree) leaves it out.
     pub const EMPTY: [u32; 2] = [u32::MAX; 2];
 
     /// Whether a collision has contact points.
@@ -43,11 +41,6 @@ impl OrderInput<'_> {
     /// Refuses input that cannot be ordered. Reports the error with the lowest index.
     pub(super) fn check(&self) -> Result<(), OrderError> {
         let bodies = self.moving.len();
-        if bodies != self.positions.len() {
-            let (moving, positions) = (bodies, self.positions.len());
-            return Err(OrderError::UnequalLengths { moving, positions });
-        }
-        // Sums of two ranks are stored in 32 bits.
         let too_many = |what, found: usize, most: usize| match found <= most {
             true => Ok(()),
             false => Err(OrderError::TooMany { what, found, most }),
@@ -81,7 +74,6 @@ impl OrderInput<'_> {
 pub struct InputBuffers {
     pairs: Vec<[u32; 2]>,
     moving: Vec<bool>,
-    positions: Vec<[f32; 3]>,
 }
 
 impl InputBuffers {
@@ -121,18 +113,16 @@ impl InputBuffers {
             [body_a, body_b.min(u32::MAX - u32::from(body_a == u32::MAX))]
         }));
         self.moving.clear();
-        self.positions.clear();
         for index in 0..bodies.len() {
             let body = bodies.body(index);
             let shape = usize::try_from(body.shape).ok().and_then(|shape| shapes.get(shape));
             self.moving.push(shape.is_some_and(|shape| shape.inverse_mass != 0.0));
-            self.positions.push(body.pose.position);
         }
     }
 
     /// The input that was read last.
     #[must_use]
     pub fn input(&self) -> OrderInput<'_> {
-        OrderInput { pairs: &self.pairs, moving: &self.moving, positions: &self.positions }
+        OrderInput { pairs: &self.pairs, moving: &self.moving }
     }
 }

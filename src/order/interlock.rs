@@ -119,7 +119,6 @@ mod tests {
     const INPUT: OrderInput<'static> = OrderInput {
         pairs: &[[0, 1], [1, 2], [0, 3], [3, 4]],
         moving: &[false, true, true, true, true],
-        positions: &[[0.0; 3]; 5],
     };
 
     fn cycles(entries: &[u32], pipeline: Interlock, limit: u64) -> u64 {

@@ -1,17 +1,14 @@
 //! Decides in which order the collisions of a step enter the pipeline.
 //!
-//! ```text
-//! bodies, collisions -> input -> sweep -> groups -> schedule -> check
-//! ```
-//!
 //! A collision reads the velocities of its bodies when it enters and writes them back a *window*
 //! later. A collision that shares a moving body with one of the `depth - 1` issue slots before it
-//! reads a stale velocity, and the impulse of the earlier one is lost. [`Order::HazardFree`] spaces
-//! the uses of every body so that this never happens, keeps few bodies alive at once (alive: from a
-//! body's first use to its last), and leaves slots empty only where nothing fits;
-//! [`Order::HazardFreeNearby`] instead keeps the collisions near to where they were given. Hardware
-//! that ignores hazards, hardware that waits on them and a sequential solver then give the same
-//! bits.
+//! meets a *hazard*. A board with an issue queue keeps hazards apart by itself, and gets
+//! [`Order::Interleaved`], which costs the host next to nothing. Hardware that waits on a hazard
+//! loses up to a window, and hardware that ignores it reads a stale velocity, so that the impulse
+//! of the earlier one is lost: for these [`Order::HazardFree`] spaces the uses of every body so
+//! that none is left, keeps the collisions near to where they were given, and leaves slots empty
+//! only where nothing fits. Hardware that ignores hazards, hardware that waits on them and a
+//! sequential solver then give the same bits.
 //!
 //! An order is a function of its input alone. It is the same on every machine, and does not depend
 //! on earlier orders, so that a step that is repeated from a stored state is the same step.
@@ -26,7 +23,6 @@
 //! let input = OrderInput {
 //!     pairs: &[[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [1, 2], [2, 3], [3, 4], [4, 5]],
 //!     moving: &[false, true, true, true, true, true],
-//!     positions: &[0.0, 0.0, 2.0, 4.0, 6.0, 8.0].map(|x| [x, 0.0, 0.0]),
 //! };
 //! let window = IssueWindow::new(3, 1)?;
 //! let mut orderer = Orderer::new();
@@ -43,11 +39,10 @@ mod check;
 mod error;
 mod groups;
 mod input;
+mod interleave;
 mod interlock;
 mod orderer;
-mod report;
 mod schedule;
-mod sweep;
 mod tail;
 mod window;
 
@@ -57,7 +52,6 @@ pub use error::OrderError;
 pub use input::{InputBuffers, OrderInput};
 pub(crate) use interlock::Interlock;
 pub use orderer::{OrderCosts, Orderer};
-pub use report::{OrderReport, live_curve};
 pub use schedule::{Ordered, Schedule};
 pub use window::IssueWindow;
 

@@ -5,24 +5,18 @@ use pgs_support::float_env::standard;
 use super::groups::Groups;
 use super::interlock::{Interlock, StallCounter};
 use super::schedule::EMPTY;
-use super::sweep::Sweep;
-use super::tail::Tail;
 use super::{IssueWindow, Order, OrderError, OrderInput, Schedule};
 
-/// Makes orders, and keeps its memory from one to the next. For [`Order::AsGiven`] and the orders
-/// without hazards it allocates nothing once it has [made](Self::made) the same order of a scene of
-/// the same size.
+/// Makes orders, and keeps its memory from one to the next: it allocates nothing once it has made
+/// the same order of a scene of the same size.
 #[derive(Debug)]
 pub struct Orderer {
-    sweep: Sweep,
-    tail: Tail,
     groups: Groups,
     schedule: Schedule,
     /// Collisions of each body.
     uses: Vec<u32>,
     stalls: StallCounter,
     limit: usize,
-    made: Order,
 }
 
 impl Default for Orderer {
@@ -39,14 +33,11 @@ impl Orderer {
     #[must_use]
     pub fn new() -> Self {
         Self {
-            sweep: Sweep::default(),
-            tail: Tail::default(),
             groups: Groups::default(),
             schedule: Schedule::default(),
             uses: Vec::new(),
             stalls: StallCounter::default(),
             limit: Self::ENTRIES_MAX,
-            made: Order::AsGiven,
         }
     }
 
@@ -57,57 +48,32 @@ impl Orderer {
 
     /// Orders the collisions of a step.
     ///
-    /// Only the orders without hazards use the window. The order is a function of the arguments
-    /// alone. Collisions without contact points ([`OrderInput::EMPTY`]) change nothing for the
-    /// others.
+    /// Only [`Order::HazardFree`] uses the window. The order is a function of the arguments alone.
     ///
     /// # Errors
-    /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
-    /// one body twice, too many bodies or collisions, or a body with too many collisions: the
-    /// schedule would be longer than the [limit](Self::set_limit).
+    /// [`OrderError`]: a pair with a body that does not exist or with one body twice, too many
+    /// bodies or collisions, or a body with too many collisions: the schedule would be longer than
+    /// the [limit](Self::set_limit).
     pub fn order(
         &mut self,
         input: &OrderInput<'_>,
         order: Order,
         window: IssueWindow,
     ) -> Result<&Schedule, OrderError> {
-        standard(|| self.make(input, order, window))?;
+        input.check()?;
+        match order {
+            Order::AsGiven => as_given(input, &mut self.schedule),
+            Order::Interleaved => self.schedule.interleave(input.pairs.len()),
+            Order::HazardFree => {
+                let Self { groups, schedule, limit, .. } = self;
+                standard(|| groups.place(input, window, *limit, schedule))?;
+            }
+        }
         Ok(&self.schedule)
     }
 
-    fn make(
-        &mut self,
-        input: &OrderInput<'_>,
-        order: Order,
-        window: IssueWindow,
-    ) -> Result<(), OrderError> {
-        input.check()?;
-        let schedule = &mut self.schedule;
-        let mut made = order;
-        match order {
-            Order::AsGiven => as_given(input, schedule),
-            Order::HazardFree => {
-                self.sweep.run(input);
-                self.place(window, self.limit)?;
-            }
-            Order::HazardFreeNearby => {
-                self.sweep.as_given(input);
-                let collisions = self.sweep.collisions.len();
-                let most = nearby_entries_max(collisions, self.most_uses(input), window);
-                if self.place(window, self.limit.min(most)).is_err() {
-                    made = Order::HazardFree;
-                    self.sweep.run(input);
-                    self.place(window, self.limit)?;
-                }
-            }
-        }
-        self.made = made;
-        Ok(())
-    }
-
     /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order with
-    /// fewer cycles: as given, or near to it and without hazards. [`made`](Self::made) tells the
-    /// choice.
+    /// fewer cycles, as given or without hazards, and returns it with the costs of both.
     ///
     /// Such a pipeline waits by itself, and the order has no empty entries. A body with many
     /// collisions makes both orders wait about as long. The order as given is therefore taken
@@ -116,58 +82,54 @@ impl Orderer {
     /// linear in the input.
     ///
     /// # Errors
-    /// [`OrderError`]: arrays of unequal lengths, a pair with a body that does not exist or with
-    /// one body twice, too many bodies or collisions.
+    /// [`OrderError`]: a pair with a body that does not exist or with one body twice, too many
+    /// bodies or collisions.
     pub(crate) fn cheapest(
         &mut self,
         input: &OrderInput<'_>,
         window: Option<IssueWindow>,
         pipeline: &Interlock,
-    ) -> Result<OrderCosts, OrderError> {
+    ) -> Result<(Order, OrderCosts), OrderError> {
         input.check()?;
-        self.made = Order::AsGiven;
-        let given = || input.taking_part().map(|(index, _)| index);
-        let collisions = input.collisions();
-        let uses = self.most_uses(input);
-        let no_order_beats =
-            pipeline.cycles_without_hazards(collisions).max(pipeline.cycles_of_one_body(uses));
-        let longest = window.map_or(0, |window| nearby_entries_max(collisions, uses, window));
-        let counted_to =
-            one_percent_more(pipeline.cycles_without_hazards(longest).max(no_order_beats));
-        let mut as_given = self.stalls.cycles(input, given(), pipeline, counted_to);
-        let window = match window {
-            Some(window) if as_given > one_percent_more(no_order_beats) => window,
-            _ => return Ok(OrderCosts { as_given, reordered: None }),
+        let least = pipeline
+            .cycles_without_hazards(input.collisions())
+            .max(pipeline.cycles_of_one_body(self.most_uses(input)));
+        let enough = one_percent_more(least);
+        let as_given = self.cycles_as_given(input, pipeline, enough);
+        if as_given <= enough {
+            return Ok((Order::AsGiven, OrderCosts { as_given, reordered: None }));
+        }
+        let made = window.map(|window| self.order(input, Order::HazardFree, window).map(drop));
+        let reordered = match made {
+            Some(Ok(())) => {
+                self.schedule.drop_empty();
+                let entries = self.schedule.entries.iter().copied();
+                Some(self.stalls.cycles(input, entries, pipeline, u64::MAX))
+            }
+            None | Some(Err(OrderError::TooLong { .. })) => None,
+            Some(Err(error)) => return Err(error),
         };
-        match self.order(input, Order::HazardFreeNearby, window) {
-            Ok(_) => {}
-            Err(OrderError::TooLong { .. }) => {
-                self.made = Order::AsGiven;
-                return Ok(OrderCosts { as_given, reordered: None });
-            }
-            Err(error) => return Err(error),
-        }
-        // Without its empty entries the order takes no longer.
-        let mut reordered = pipeline.cycles_without_hazards(self.schedule.len());
-        self.schedule.drop_empty();
-        if as_given <= one_percent_more(reordered) {
-            let entries = self.schedule.entries.iter().copied();
-            reordered = self.stalls.cycles(input, entries, pipeline, u64::MAX);
-            let enough = one_percent_more(reordered);
-            if counted_to < enough {
-                as_given = self.stalls.cycles(input, given(), pipeline, enough);
-            }
-            if as_given <= enough {
-                self.made = Order::AsGiven;
-            }
-        }
-        Ok(OrderCosts { as_given, reordered: Some(reordered) })
+        let enough = reordered.map_or(u64::MAX, one_percent_more);
+        let as_given = self.cycles_as_given(input, pipeline, enough);
+        let order = if as_given > enough { Order::HazardFree } else { Order::AsGiven };
+        Ok((order, OrderCosts { as_given, reordered }))
     }
 
     /// Makes [`Order::AsGiven`] without the empty entries, of an input that was ordered before.
     pub(crate) fn as_given_without_empty(&mut self, input: &OrderInput<'_>) {
         as_given(input, &mut self.schedule);
         self.schedule.drop_empty();
+    }
+
+    /// Makes [`Order::Interleaved`] of this number of collisions.
+    pub(crate) fn interleave(&mut self, collisions: usize) {
+        self.schedule.interleave(collisions);
+    }
+
+    /// Cycles of the order as given without its empty entries; a lower bound above `limit`.
+    fn cycles_as_given(&mut self, input: &OrderInput<'_>, pipeline: &Interlock, limit: u64) -> u64 {
+        let entries = input.taking_part().map(|(index, _)| index);
+        self.stalls.cycles(input, entries, pipeline, limit)
     }
 
     /// Collisions of the moving body that has the most.
@@ -179,21 +141,6 @@ impl Orderer {
         }
         let moving = self.uses.iter().zip(input.moving).filter(|(_, moving)| **moving);
         moving.map(|(uses, _)| *uses as usize).max().unwrap_or(0)
-    }
-
-    /// Places the swept collisions without hazards, in at most `limit` entries.
-    fn place(&mut self, window: IssueWindow, limit: usize) -> Result<(), OrderError> {
-        let static_rank = self.sweep.static_rank();
-        let sweep = &mut self.sweep.collisions;
-        self.tail.bring_forward(sweep, window.entries(), static_rank);
-        self.groups.place(sweep, static_rank, window, limit, &mut self.schedule)
-    }
-
-    /// The kind of the last order: the requested kind, or [`Order::HazardFree`] in its place. After
-    /// an error the value has no meaning.
-    #[must_use]
-    pub fn made(&self) -> Order {
-        self.made
     }
 
     /// The schedule of the last order; empty before the first.
@@ -214,18 +161,6 @@ fn as_given(input: &OrderInput<'_>, schedule: &mut Schedule) {
     schedule.empty = input.pairs.len() - input.collisions();
 }
 
-/// Largest number of entries of [`Order::HazardFreeNearby`] for `collisions` collisions, if the
-/// busiest moving body has `uses` of them.
-///
-/// In every order the uses of a body lie a window apart. Beyond that, one entry in 64 and four
-/// windows may be empty. This is a choice: it leaves most piles of the thesis' cubes where they are
-/// (`pgs thesis order --grid` shows the empty entries of either order).
-pub(super) fn nearby_entries_max(collisions: usize, uses: usize, window: IssueWindow) -> usize {
-    let entries = collisions.max(uses.saturating_sub(1) * window.entries());
-    // One empty entry in 64 is one beside 63 others.
-    entries + entries / 63 + 4 * window.entries()
-}
-
 /// The cost of two orders on a pipeline that waits on hazards: cycles of all passes of a step,
 /// including stalls. Waits for memory and the fill of the pipeline are left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -234,9 +169,9 @@ pub struct OrderCosts {
     /// Cost of [`Order::AsGiven`]. Where the other order was taken this is a lower bound, because
     /// counting ends as soon as the cost is known to be higher.
     pub as_given: u64,
-    /// Cost of [`Order::HazardFreeNearby`] without empty entries. `None` where this order was not
-    /// made: hardly any order takes fewer cycles than as given, or a body has too many collisions
-    /// to order them. Where it was taken this is an upper bound.
+    /// Cost of [`Order::HazardFree`] without empty entries. `None` where this order was not made:
+    /// hardly any order takes fewer cycles than as given, or a body has too many collisions to
+    /// order them.
     pub reordered: Option<u64>,
 }
 

@@ -1,5 +1,6 @@
 //! Holds an order: the collision of each entry, and the empty entries.
 
+use super::interleave::interleave;
 use crate::scene::{Collision, Collisions, Impulses, Structures};
 
 /// The value of an empty entry. No collision has this index, because the number of collisions is
@@ -61,6 +62,13 @@ impl Schedule {
             self.entries.retain(|index| *index != EMPTY);
             self.empty = 0;
         }
+    }
+
+    /// Interleaves `count` collisions, with or without contact points.
+    pub(crate) fn interleave(&mut self, count: usize) {
+        self.empty = 0;
+        self.entries.resize(count, EMPTY);
+        interleave(&mut self.entries);
     }
 
     pub(super) fn clear(&mut self) {

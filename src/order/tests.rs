@@ -4,23 +4,21 @@ mod empty;
 
 use proptest::prelude::*;
 
-use super::orderer::nearby_entries_max;
 use super::*;
 use crate::scene::{
     Body, Collision, CollisionArrays, Collisions, Contact, Pose, Shape, Structures, Velocity,
 };
 
-/// A scene without geometry: pairs, which bodies move, and positions.
+/// A scene without geometry: pairs, and which bodies move.
 #[derive(Debug, Clone)]
 struct Given {
     pairs: Vec<[u32; 2]>,
     moving: Vec<bool>,
-    positions: Vec<[f32; 3]>,
 }
 
 impl Given {
     fn input(&self) -> OrderInput<'_> {
-        OrderInput { pairs: &self.pairs, moving: &self.moving, positions: &self.positions }
+        OrderInput { pairs: &self.pairs, moving: &self.moving }
     }
 }
 
@@ -32,9 +30,8 @@ fn any_given(bodies: u32, pairs: usize) -> impl Strategy<Value = Given> {
         (
             prop::collection::vec(pair, 0..pairs),
             prop::collection::vec(prop::bool::weighted(0.8), size),
-            prop::collection::vec(prop::array::uniform3(-80.0_f32..80.0), size),
         )
-            .prop_map(|(pairs, moving, positions)| Given { pairs, moving, positions })
+            .prop_map(|(pairs, moving)| Given { pairs, moving })
     })
 }
 
@@ -43,7 +40,7 @@ fn any_window() -> impl Strategy<Value = IssueWindow> {
     (depth, 1_u32..4).prop_map(|(depth, per)| IssueWindow::new(depth, per).expect("a window"))
 }
 
-const ORDERS: [Order; 3] = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];
+const ORDERS: [Order; 3] = [Order::AsGiven, Order::Interleaved, Order::HazardFree];
 
 fn ordered(given: &Given, order: Order, window: IssueWindow) -> Schedule {
     let mut orderer = Orderer::new();
@@ -64,37 +61,10 @@ proptest! {
     }
 
     #[test]
-    fn hazard_free_orders_have_no_hazard(given in any_given(200, 600), window in any_window()) {
-        for order in ORDERS.into_iter().filter(|order| order.is_hazard_free()) {
-            let schedule = ordered(&given, order, window);
-            let input = given.input();
-            prop_assert_eq!(Checker::new().verify(&schedule, &input, window), Ok(()));
-            let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
-            prop_assert_eq!((report.hazards, report.lost_updates), (0, 0));
-            prop_assert!(schedule.iter().last().is_none_or(|last| last.is_some()));
-        }
-    }
-
-    /// A hazard-free order near to the given one is hardly longer than the collisions, or gives way
-    /// to the other hazard-free order; [`Orderer::made`] tells which.
-    #[test]
-    fn a_nearby_order_is_short_or_the_other_one(
-        given in any_given(200, 600),
-        window in any_window(),
-    ) {
-        let mut orderer = Orderer::new();
-        let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("an order");
-        let (nearby, made) = (nearby.clone(), orderer.made());
-        let uses = |body: u32| given.pairs.iter().filter(|pair| pair.contains(&body)).count();
-        let moving = (0..).zip(&given.moving).filter(|(_, moving)| **moving);
-        let most_uses = moving.map(|(body, _)| uses(body)).max().unwrap_or(0);
-        let most = nearby_entries_max(given.pairs.len(), most_uses, window);
-        if made == Order::HazardFreeNearby {
-            prop_assert!(nearby.len() <= most, "{}", nearby.len());
-        } else {
-            prop_assert_eq!(made, Order::HazardFree);
-            prop_assert_eq!(nearby, ordered(&given, Order::HazardFree, window));
-        }
+    fn a_hazard_free_order_has_no_hazard(given in any_given(200, 600), window in any_window()) {
+        let schedule = ordered(&given, Order::HazardFree, window);
+        prop_assert_eq!(Checker::new().verify(&schedule, &given.input(), window), Ok(()));
+        prop_assert!(schedule.iter().last().is_none_or(|last| last.is_some()));
     }
 
     /// Compares every pair of uses with every other.
@@ -116,8 +86,6 @@ proptest! {
                 })
             });
             let hazards = hazards.count();
-            let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
-            prop_assert_eq!(report.hazards, hazards);
             let verified = Checker::new().verify(&schedule, &input, window);
             prop_assert_eq!(verified.is_ok(), hazards == 0);
         }
@@ -142,10 +110,8 @@ proptest! {
 fn sheet(side: u32) -> Given {
     let at = |x: u32, z: u32| 1 + x * side + z;
     let mut pairs = Vec::new();
-    let mut positions = vec![[0.0; 3]];
     for x in 0..side {
         for z in 0..side {
-            positions.push([2.0 * x as f32, 1.0, 2.0 * z as f32]);
             pairs.push([0, at(x, z)]);
             if x + 1 < side {
                 pairs.push([at(x, z), at(x + 1, z)]);
@@ -155,113 +121,61 @@ fn sheet(side: u32) -> Given {
             }
         }
     }
-    let moving = (0..positions.len()).map(|body| body > 0).collect();
-    Given { pairs, moving, positions }
+    let moving = (0..=side * side).map(|body| body > 0).collect();
+    Given { pairs, moving }
 }
 
 #[test]
-fn a_sheet_is_ordered_with_few_bodies_alive_and_hardly_an_empty_entry() {
+fn a_sheet_is_ordered_with_hardly_an_empty_entry() {
     let given = sheet(60);
     for (depth, per_issue) in [(16, 1), (64, 1), (16, 2)] {
         let window = IssueWindow::new(depth, per_issue).expect("a window");
         let schedule = ordered(&given, Order::HazardFree, window);
-        let report = OrderReport::measure(&schedule, &given.input(), window).expect("a schedule");
-        // Two rows of 60, and two windows of two bodies a collision.
-        assert!(report.most_alive <= 120 + 4 * window.entries(), "{report:?}");
         // Emptying the pipeline at the end is the only cost.
-        assert!(report.empty <= 2 * window.entries(), "{report:?}");
+        assert!(schedule.empty() <= 4 * window.entries(), "{depth}: {}", schedule.empty());
         let sorted = ordered(&given, Order::AsGiven, window);
-        let sorted = OrderReport::measure(&sorted, &given.input(), window).expect("a schedule");
-        assert!(sorted.hazards > given.pairs.len() / 2, "{sorted:?}");
+        assert!(Checker::new().verify(&sorted, &given.input(), window).is_err());
     }
 }
 
-/// Collisions of distant bodies are given one behind the other, as no sweep meets them.
 #[test]
-fn a_nearby_order_moves_hardly_a_collision_far() {
-    let mut given = sheet(160);
-    let positions = given.positions.len();
-    for (body, position) in given.positions.iter_mut().enumerate() {
-        position[0] = ((body * 7919) % positions) as f32;
-    }
-    let moved = |schedule: &Schedule| {
-        let places = schedule.iter().enumerate();
-        let far = places.filter_map(|(entry, index)| Some(entry.abs_diff(index? as usize)));
-        far.max().expect("an entry")
-    };
+fn a_hazard_free_order_moves_hardly_a_collision_far() {
+    let given = sheet(160);
     for (depth, per_issue) in [(16, 1), (64, 1), (106, 2)] {
         let window = IssueWindow::new(depth, per_issue).expect("a window");
-        let mut orderer = Orderer::new();
-        let nearby = orderer.order(&given.input(), Order::HazardFreeNearby, window);
-        let nearby = nearby.expect("an order").clone();
-        assert_eq!(orderer.made(), Order::HazardFreeNearby, "{depth}");
+        let schedule = ordered(&given, Order::HazardFree, window);
         // The open groups, the waiting collisions, and the ones brought forward at the end.
         let reach = 64 * (depth.div_ceil(8) * per_issue) as usize + 256 + 16 * window.entries();
-        assert!(moved(&nearby) <= reach, "{depth}: {}", moved(&nearby));
-        let swept = ordered(&given, Order::HazardFree, window);
-        assert!(moved(&swept) > given.pairs.len() / 2, "{depth}: {}", moved(&swept));
+        let places = schedule.iter().enumerate();
+        let far = places.filter_map(|(entry, index)| Some(entry.abs_diff(index? as usize)));
+        let far = far.max().expect("an entry");
+        assert!(far <= reach, "{depth}: {far}");
     }
-}
-
-#[test]
-fn a_nearby_order_is_about_as_long_as_any_has_to_be() {
-    let window = IssueWindow::new(24, 2).expect("a window");
-    for (collisions, uses, most) in [
-        (0, 0, 192),
-        (62, 1, 62 + 192),
-        (63, 1, 64 + 192),
-        (127_746, 12, 127_746 + 2_027 + 192),
-        // Nine windows between ten uses.
-        (10, 10, 432 + 6 + 192),
-    ] {
-        assert_eq!(nearby_entries_max(collisions, uses, window), most, "{collisions}, {uses}");
-    }
-}
-
-/// The other order is shorter, and the nearby one is too long for the board.
-#[test]
-fn a_nearby_order_gives_way_to_one_that_fits() {
-    let window = IssueWindow::new(64, 1).expect("a window");
-    let (given, swept) = (5..40)
-        .find_map(|side| {
-            let given = sheet(side);
-            let [nearby, swept] = [Order::HazardFreeNearby, Order::HazardFree]
-                .map(|order| ordered(&given, order, window));
-            (nearby.len() > swept.len()).then_some((given, swept))
-        })
-        .expect("one of them");
-    let mut orderer = Orderer::new();
-    orderer.set_limit(swept.len());
-    orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("it fits");
-    assert_eq!((orderer.schedule(), orderer.made()), (&swept, Order::HazardFree));
-    orderer.set_limit(Orderer::ENTRIES_MAX);
-    orderer.order(&given.input(), Order::HazardFreeNearby, window).expect("it fits");
-    assert_eq!(orderer.made(), Order::HazardFreeNearby);
 }
 
 /// The limit applies to the order that was made, and the error names it.
 #[test]
-fn a_nearby_order_has_the_same_limit() {
+fn an_order_longer_than_its_limit_is_refused() {
     let given = sheet(30);
     let window = IssueWindow::new(64, 1).expect("a window");
     let mut orderer = Orderer::new();
-    let entries = |orderer: &mut Orderer, order| {
-        orderer.order(&given.input(), order, window).map(Schedule::len)
+    let entries = |orderer: &mut Orderer| {
+        orderer.order(&given.input(), Order::HazardFree, window).map(Schedule::len)
     };
-    let nearby = entries(&mut orderer, Order::HazardFreeNearby).expect("an order");
-    assert_eq!(orderer.made(), Order::HazardFreeNearby);
-    orderer.set_limit(nearby);
-    assert_eq!(entries(&mut orderer, Order::HazardFreeNearby), Ok(nearby));
+    let length = entries(&mut orderer).expect("an order");
+    orderer.set_limit(length);
+    assert_eq!(entries(&mut orderer), Ok(length));
     let limit = given.pairs.len();
+    assert!(length > limit, "it has empty entries");
     orderer.set_limit(limit);
     let refused = OrderError::TooLong { depth: 64, limit, collisions: limit };
-    assert_eq!(entries(&mut orderer, Order::HazardFreeNearby), Err(refused));
+    assert_eq!(entries(&mut orderer), Err(refused));
 }
 
 #[test]
 fn a_body_that_meets_all_others_takes_one_collision_a_window() {
     let pairs: Vec<[u32; 2]> = (1..=40).map(|body| [0, body]).collect();
-    let given = Given { pairs, moving: vec![true; 41], positions: vec![[0.0; 3]; 41] };
+    let given = Given { pairs, moving: vec![true; 41] };
     let window = IssueWindow::new(24, 1).expect("a window");
     let mut orderer = Orderer::new();
     let schedule = orderer.order(&given.input(), Order::HazardFree, window).expect("an order");
@@ -278,8 +192,7 @@ fn a_body_that_meets_all_others_takes_one_collision_a_window() {
 fn a_scene_without_collisions_or_bodies_has_an_empty_order() {
     let window = IssueWindow::new(158, 1).expect("a window");
     for bodies in [0, 3] {
-        let none =
-            Given { pairs: vec![], moving: vec![true; bodies], positions: vec![[0.0; 3]; bodies] };
+        let none = Given { pairs: vec![], moving: vec![true; bodies] };
         for order in ORDERS {
             assert!(ordered(&none, order, window).is_empty());
         }
@@ -289,8 +202,7 @@ fn a_scene_without_collisions_or_bodies_has_an_empty_order() {
 #[test]
 fn input_that_cannot_be_ordered_is_refused_by_its_index() {
     let window = IssueWindow::new(4, 1).expect("a window");
-    let good =
-        OrderInput { pairs: &[[0, 1], [1, 2]], moving: &[true; 3], positions: &[[0.0; 3]; 3] };
+    let good = OrderInput { pairs: &[[0, 1], [1, 2]], moving: &[true; 3] };
     let refused = |input: &OrderInput<'_>| {
         let of_order = Orderer::new().order(input, Order::HazardFree, window).map(|_| ());
         let of_check = Checker::new().verify(&Schedule::default(), input, window);
@@ -307,19 +219,12 @@ fn input_that_cannot_be_ordered_is_refused_by_its_index() {
         refused(&OrderInput { pairs, ..good }),
         OrderError::SelfCollision { collision: 1, body: 1 }
     );
-    assert_eq!(
-        refused(&OrderInput { moving: &[true; 2], ..good }),
-        OrderError::UnequalLengths { moving: 2, positions: 3 }
-    );
 }
 
 #[test]
 fn a_wrong_schedule_is_refused_where_it_is_wrong() {
-    let input = OrderInput {
-        pairs: &[[0, 1], [1, 2], [3, 4]],
-        moving: &[false, true, true, true, true],
-        positions: &[[0.0; 3]; 5],
-    };
+    let input =
+        OrderInput { pairs: &[[0, 1], [1, 2], [3, 4]], moving: &[false, true, true, true, true] };
     let window = IssueWindow::new(2, 1).expect("a window");
     let verified = |entries: &[Option<u32>]| {
         Checker::new().verify(&entries.iter().copied().collect(), &input, window)
@@ -362,7 +267,6 @@ fn ordered_collisions_are_the_callers_with_padding_between() {
     let input = buffers.gather(&bodies, &collisions, &shapes);
     assert_eq!(input.pairs, [[0, 1], [2, 1], [3, 1]]);
     assert_eq!(input.moving, [false, true, true, false]);
-    assert_eq!(input.positions[2].map(f32::to_bits), [1.0_f32, 0.0, 0.0].map(f32::to_bits));
 
     let schedule: Schedule = [Some(2), None, Some(0), Some(1)].into_iter().collect();
     let ordered = Ordered { collisions: &collisions, schedule: &schedule };

@@ -2,46 +2,100 @@
 
 use std::mem::offset_of;
 
+use super::FULL;
 use super::body_table::End;
-use super::{Counted, NORMAL, Record, bodies, contact_rows, row_of, used};
-use crate::scene::Collision;
-use crate::simd::{Integer, Lanes};
-use pgs_interface::record::{CONTACT_POINTS, WORD_LANE, collision};
+use crate::scene::{Collision, Contact};
+use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE, collision};
+
+/// Masks of the contact points in use, by their number: in the lanes of one row, and in rows of
+/// their own.
+///
+/// A look-up instead of branches: counts follow no pattern that a processor can predict.
+const USED_LANES: [Beat; CONTACT_POINTS + 1] = {
+    let mut used = [Beat([0; LANES]); CONTACT_POINTS + 1];
+    let mut count = 1;
+    while count <= CONTACT_POINTS {
+        used[count] = used[count - 1];
+        used[count].0[count - 1] = u32::MAX;
+        count += 1;
+    }
+    used
+};
+const USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] = {
+    let mut used = [[Beat([0; LANES]); CONTACT_POINTS]; CONTACT_POINTS + 1];
+    let mut at = 0;
+    while at < CONTACT_POINTS * (CONTACT_POINTS + 1) {
+        let (count, point) = (at / CONTACT_POINTS, at % CONTACT_POINTS);
+        used[count][point] = Beat([USED_LANES[count].0[point]; LANES]);
+        at += 1;
+    }
+    used
+};
+
+/// The masks of the first `points` contact points. Validation refuses a number above [`FULL`].
+#[inline(always)]
+pub(crate) fn used(points: u32) -> &'static [Beat; CONTACT_POINTS] {
+    &USED[points.min(FULL) as usize]
+}
+
+/// [`used`] in the lanes of one row.
+#[inline(always)]
+pub(crate) fn used_lanes(points: u32) -> &'static Beat {
+    &USED_LANES[points.min(FULL) as usize]
+}
+
+/// The bits that both have.
+#[inline(always)]
+pub(crate) fn and(one: Beat, other: &Beat) -> Beat {
+    Beat(std::array::from_fn(|lane| one.0[lane] & other.0[lane]))
+}
 
 /// The collision record: normal and count, positions and indices of both bodies, contact points.
 ///
-/// Contact points from the count on are zeros: the caller may leave anything there (NaN too), and
+/// Contact points from `points` on are zeros: the caller may leave anything there (NaN too), and
 /// the record must not depend on it.
 ///
 /// Shape: 7 rows. Units: metres, world frame; distance negative = penetrating.
 ///
 /// Source: interface specification, record table.
 #[inline(always)]
-pub(crate) fn encode(of: Counted<'_>, [a, b]: [&End; 2]) -> Record<{ collision::ROWS }> {
-    let from = of.collision;
-    let mut rows = [Lanes::all(0); collision::ROWS];
-    rows[collision::NORMAL] = row_of::<NORMAL, _>(from);
-    rows[collision::BODY_A] = a.with_tag();
-    rows[collision::BODY_B] = b.with_tag();
-    let contacts = contact_rows(from).into_iter().zip(&mut rows[collision::CONTACTS..]);
-    for ((point, row), used) in contacts.zip(used(of.count())) {
-        *row = point.and(used);
+pub(crate) fn encode(
+    from: &Collision,
+    points: u32,
+    ends: [&End; 2],
+    to: &mut [Beat; collision::ROWS],
+) {
+    let words: &[u32; size_of::<Collision>() / 4] = bytemuck::cast_ref(from);
+    let row = |at: usize| Beat(std::array::from_fn(|lane| words[at + lane]));
+    to[collision::NORMAL] = row(NORMAL);
+    let bodies = [(collision::BODY_A, from.body_a), (collision::BODY_B, from.body_b)];
+    for ((at, body), end) in bodies.into_iter().zip(ends) {
+        to[at] = bytemuck::cast(*end);
+        to[at].0[WORD_LANE] = body;
     }
-    let mut integers = [None; collision::ROWS];
-    integers[collision::NORMAL] = Some(Integer::new::<WORD_LANE>(rows[collision::NORMAL]));
-    [integers[collision::BODY_A], integers[collision::BODY_B]] = bodies(from).map(Some);
-    Record { rows, integers }
+    for (point, used) in used(points).iter().enumerate() {
+        to[collision::CONTACTS + point] = and(row(CONTACTS + LANES * point), used);
+    }
 }
 
+/// The first words of a collision's normal, and of its contact points.
+const NORMAL: usize = offset_of!(Collision, normal) / 4;
+const CONTACTS: usize = offset_of!(Collision, contacts) / 4;
 const _: () = assert!(collision::CONTACTS + CONTACT_POINTS == collision::ROWS);
-// The count of a collision follows its normal.
+// Each row lies in a collision as in its record.
 const _: () = assert!(offset_of!(Collision, count) == 4 * (NORMAL + WORD_LANE));
+const _: () = assert!(size_of::<Contact>() == 4 * LANES);
+const _: () = assert!(offset_of!(Contact, distance) == 4 * WORD_LANE);
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Contact;
-    use pgs_interface::record::Beat;
+
+    fn encoded(of: &Collision, ends: [End; 2]) -> [Beat; collision::ROWS] {
+        let mut rows = [Beat([7; LANES]); collision::ROWS];
+        encode(of, of.count, ends.each_ref(), &mut rows);
+        rows
+    }
 
     #[test]
     fn a_collision_record_is_these_bytes() {
@@ -88,14 +142,13 @@ mod tests {
             0x00, 0x00, 0x00, 0x00, // unused
         ];
         let ends = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]].map(End::at);
-        let beats = encode((&collision).into(), ends.each_ref()).whole().map(Beat::from);
-        assert_eq!(bytemuck::bytes_of(&beats), bytes);
+        assert_eq!(bytemuck::bytes_of(&encoded(&collision, ends)), bytes);
     }
 
     #[test]
     fn contact_points_from_count_on_are_sent_as_zeros() {
         let contact = Contact { point: [f32::NAN; 3], distance: f32::NAN };
-        for count in 0..=4_u32 {
+        for count in [0, 1, 2, 3, 4, 5, u32::MAX] {
             let collision = Collision {
                 body_a: 0,
                 body_b: 1,
@@ -103,7 +156,7 @@ mod tests {
                 count,
                 contacts: [contact; 4],
             };
-            let beats = encode((&collision).into(), [&End::MISSING; 2]).rows.map(Beat::from);
+            let beats = encoded(&collision, [End::MISSING; 2]);
             for (ordinal, beat) in (0..).zip(&beats[3..]) {
                 assert_eq!(*beat == Beat([0; 4]), ordinal >= count, "count {count}: {ordinal}");
             }

@@ -1,228 +1,62 @@
 //! Turns a caller's values into the rows of a record, and a result record back.
 //!
-//! One file per record kind makes rows of 32-bit words; a row is one beat of an f32 stream.
-//! `sixteen` narrows rows for streams of sixteen bits and widens results. The layout is that of
-//! [`interface::record`](pgs_interface::record). `beat` decides which channel a beat travels on.
+//! A row is four words of 32 bits, which is one beat of an f32 stream. The layout is that of
+//! [`interface::record`](pgs_interface::record). `beat` makes the words of other streams, and
+//! decides which channel a beat travels on.
 
+pub(crate) mod body;
 pub(crate) mod body_table;
 pub(crate) mod collision;
-pub(crate) mod finite;
 pub(crate) mod inertia;
-pub(crate) mod largest;
-pub(crate) mod pose;
 pub(crate) mod result;
-pub(crate) mod sixteen;
-pub(crate) mod source;
-pub(crate) mod velocity;
 
-use std::mem::offset_of;
-use std::slice;
-
-use bytemuck::Pod;
-
-use crate::scene::{Body, Collision, Contact};
-use crate::simd::{Integer, Lanes};
 use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE};
-
-/// A record in f32, before it is streamed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Record<const ROWS: usize> {
-    /// In a row with an integer, the last word has no meaning.
-    pub(crate) rows: [Lanes; ROWS],
-    /// The unsigned integers at the ends of rows. An integer stays in its source vector until its
-    /// beat is written: a way through the row of numbers and out of the narrowed row would move it
-    /// twice.
-    pub(crate) integers: [Option<Integer>; ROWS],
-}
-
-/// A row of a record.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Row {
-    /// The last word is a number only in a row without an integer.
-    pub(crate) numbers: Lanes,
-    pub(crate) integer: Option<Integer>,
-}
-
-impl Row {
-    /// Four zeros.
-    #[inline(always)]
-    pub(crate) fn zero() -> Self {
-        Self { numbers: Lanes::all(0), integer: None }
-    }
-
-    /// All four words.
-    #[inline(always)]
-    pub(crate) fn whole(self) -> Lanes {
-        match self.integer {
-            None => self.numbers,
-            Some(integer) => self.numbers.beside(integer.into()),
-        }
-    }
-}
-
-impl<const ROWS: usize> From<[Lanes; ROWS]> for Record<ROWS> {
-    /// A record of numbers alone.
-    #[inline(always)]
-    fn from(rows: [Lanes; ROWS]) -> Self {
-        Self { rows, integers: [None; ROWS] }
-    }
-}
-
-impl<const ROWS: usize> Record<ROWS> {
-    /// Gives all rows to `to`, one after the other.
-    #[inline(always)]
-    pub(crate) fn give(&self, to: &mut impl Rows) {
-        // Written out: a loop is unrolled only in part, which sends its rows through memory.
-        macro_rules! each {
-            ($($at:literal)*) => {
-                const { assert!(ROWS <= [$($at),*].len(), "all of them are written out") };
-                // A row that the record does not have is not compiled.
-                $(if const { $at < ROWS } {
-                    to.row(Row { numbers: self.rows[$at], integer: self.integers[$at] });
-                })*
-            };
-        }
-        each!(0 1 2 3 4 5 6);
-    }
-
-    /// The rows with their integers in place.
-    #[cfg(test)]
-    pub(crate) fn whole(self) -> [Lanes; ROWS] {
-        std::array::from_fn(|at| Row { numbers: self.rows[at], integer: self.integers[at] }.whole())
-    }
-}
-
-/// The destination of a record's rows.
-///
-/// Every implementation carries `#[inline(always)]`: it becomes a part of the loop that gives the
-/// rows.
-pub(crate) trait Rows {
-    /// Takes the next row.
-    fn row(&mut self, row: Row);
-}
-
-/// A vec3 and the word beside it.
-#[inline(always)]
-fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Lanes {
-    Lanes::new([x.to_bits(), y.to_bits(), z.to_bits(), word])
-}
-
-/// Four words of a structure, from its word `AT` on: a vec4, or a vec3 and the word after it.
-#[inline(always)]
-fn row_of<const AT: usize, T: Pod>(structure: &T) -> Lanes {
-    const { assert!(4 * (AT + LANES) <= size_of::<T>(), "they are its words") };
-    let words: &[u32] = bytemuck::cast_slice(slice::from_ref(structure));
-    words[AT..].first_chunk().map_or(Lanes::all(0), |row| Lanes::new(*row))
-}
-
-/// A vec3 beside zero.
-#[inline(always)]
-pub(crate) fn alone(row: Lanes) -> Lanes {
-    row.and(Lanes::new([u32::MAX, u32::MAX, u32::MAX, 0]))
-}
-
-/// The indices of the bodies of a collision.
-#[inline(always)]
-pub(crate) fn bodies(collision: &Collision) -> [Integer; 2] {
-    let words = body_words(collision);
-    [Integer::new::<0>(words), Integer::new::<1>(words)]
-}
-
-/// The indices of the bodies of a collision, as the first two of four words.
-#[inline(always)]
-pub(crate) fn body_words(collision: &Collision) -> Lanes {
-    row_of::<BODIES, _>(collision)
-}
-
-/// The normal of a collision beside its count.
-#[inline(always)]
-pub(crate) fn normal_and_count(collision: &Collision) -> Lanes {
-    row_of::<NORMAL, _>(collision)
-}
-
-/// The first of the two words with the indices of a collision's bodies: A, then B.
-const BODIES: usize = offset_of!(Collision, body_a) / 4;
-const _: () = assert!(offset_of!(Collision, body_b) == 4 * (BODIES + 1));
-
-/// The first word of a collision's normal.
-const NORMAL: usize = offset_of!(Collision, normal) / 4;
-
-/// The lane of the shape index in the row that begins with a body's angular velocity.
-const SHAPE: usize = offset_of!(Body, shape) / 4 - ANGULAR;
-
-/// The first words of the vectors of a body.
-const POSITION: usize = offset_of!(Body, pose.position) / 4;
-const ORIENTATION: usize = offset_of!(Body, pose.orientation) / 4;
-const LINEAR: usize = offset_of!(Body, velocity.linear) / 4;
-const ANGULAR: usize = offset_of!(Body, velocity.angular) / 4;
-
-/// Four numbers, one per lane.
-#[inline(always)]
-fn vec4(value: [f32; 4]) -> Lanes {
-    Lanes::new(value.map(f32::to_bits))
-}
-
-/// All four contact points of a collision beside their distances.
-#[inline(always)]
-pub(crate) fn contact_rows(collision: &Collision) -> [Lanes; CONTACT_POINTS] {
-    let row = |contact: &Contact| vec3_and_word(contact.point, contact.distance.to_bits());
-    collision.contacts.each_ref().map(row)
-}
-
-/// A collision, and whether it is known to use all four contact points. If so, no point needs a
-/// mask.
-#[derive(Clone, Copy)]
-pub(crate) struct Counted<'a> {
-    pub(crate) collision: &'a Collision,
-    full: bool,
-}
-
-impl<'a> Counted<'a> {
-    /// A collision that is known to use all contact points.
-    #[inline(always)]
-    pub(crate) fn full(collision: &'a Collision) -> Self {
-        debug_assert_eq!(collision.count, FULL, "it has all");
-        Self { collision, full: true }
-    }
-
-    /// The number of contact points in use.
-    #[inline(always)]
-    pub(crate) const fn count(self) -> u32 {
-        // A constant after inlining where `full` is known: the code that depends on it folds, too.
-        if self.full { FULL } else { self.collision.points() }
-    }
-}
-
-impl<'a> From<&'a Collision> for Counted<'a> {
-    /// A collision with any number of contact points. [`Collision::NOTHING`] replaces a collision
-    /// with none, whose other values may be anything.
-    #[inline(always)]
-    fn from(collision: &'a Collision) -> Self {
-        if collision.is_empty() {
-            // Most scenes have none, so the processor predicts this branch.
-            pgs_support::cold_path();
-            return Self { collision: &Collision::NOTHING, full: false };
-        }
-        Self { collision, full: false }
-    }
-}
 
 /// The largest number of contact points of a collision.
 #[expect(clippy::cast_possible_truncation, reason = "four")]
 pub(crate) const FULL: u32 = CONTACT_POINTS as u32;
 
-/// One mask per contact point: all bits if the point is in use, else none. A count beyond `i32`,
-/// which validation refuses, gives no bits.
-///
-/// The code has no branch: unless a collision is known to use all points ([`Counted`]), counts
-/// follow no pattern that a processor can predict.
-#[inline(always)]
-pub(crate) fn used(count: u32) -> [Lanes; CONTACT_POINTS] {
-    let mut used = [Lanes::all(count); CONTACT_POINTS];
-    for (ordinal, used) in (0..).zip(&mut used) {
-        *used = used.above(Lanes::all(ordinal));
+/// An f32 without its sign.
+pub(crate) const MAGNITUDE: u32 = u32::MAX >> 1;
+
+/// The largest magnitudes of some rows, lane by lane, as bits. The bits of magnitudes are in the
+/// order of the magnitudes, and infinity and NaN are above all numbers.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Magnitudes([u32; LANES]);
+
+impl Magnitudes {
+    /// Takes one more row.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, row: Beat) {
+        for (largest, word) in self.0.iter_mut().zip(row.0) {
+            *largest = (*largest).max(word & MAGNITUDE);
+        }
     }
-    used
+
+    /// Whether all numbers of all rows are within a limit.
+    #[inline(always)]
+    pub(crate) fn are_within(&self, limit: f32) -> bool {
+        self.0.iter().fold(true, |within, largest| within & (*largest <= limit.to_bits()))
+    }
+
+    /// The same without the word beside the vec3 of each row.
+    #[inline(always)]
+    pub(crate) fn of_vec3_are_within(mut self, limit: f32) -> bool {
+        self.0[WORD_LANE] = 0;
+        self.are_within(limit)
+    }
+}
+
+/// A vec3 and the word beside it.
+#[inline(always)]
+fn vec3_and_word([x, y, z]: [f32; 3], word: u32) -> Beat {
+    Beat([x.to_bits(), y.to_bits(), z.to_bits(), word])
+}
+
+/// Four numbers, one per lane.
+#[inline(always)]
+fn vec4(value: [f32; 4]) -> Beat {
+    Beat(value.map(f32::to_bits))
 }
 
 /// The vec3 of a beat. The word beside it is ignored.
@@ -245,13 +79,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_does_not_depend_on_the_other_values_of_an_empty_collision() {
-        let nan = Contact { point: [f32::NAN; 3], distance: f32::NAN };
-        let (normal, contacts) = ([f32::INFINITY; 3], [nan; CONTACT_POINTS]);
-        let empty = Collision { body_a: 7, body_b: u32::MAX, normal, count: 0, contacts };
-        let of = Counted::from(&empty);
-        assert_eq!((*of.collision, of.count()), (Collision::NOTHING, 0));
-        let one = Collision { count: 1, ..empty };
-        assert_eq!(Counted::from(&one).collision.body_a, 7);
+    fn every_number_is_held_against_the_limit() {
+        for (row, all, vec3) in [
+            ([2.0, -2.0, 0.0, -2.0], true, true),
+            ([0.0, 0.0, 2.0_f32.next_up(), 0.0], false, false),
+            ([0.0, f32::NEG_INFINITY, 0.0, 0.0], false, false),
+            ([-f32::NAN, 0.0, 0.0, 0.0], false, false),
+            ([0.0, 0.0, 0.0, 3.0], false, true),
+        ] {
+            let mut largest = Magnitudes::default();
+            [[0.0; 4], row, [1.0; 4]].into_iter().for_each(|row| largest.see(vec4(row)));
+            let found = (largest.are_within(2.0), largest.of_vec3_are_within(2.0));
+            assert_eq!(found, (all, vec3), "{row:?}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Reads the result record of a body, and makes the record of a body that does not change.
 
-use super::{to_vec3, to_vec4, vec3_and_word, vec4};
+use super::{Magnitudes, to_vec3, to_vec4, vec3_and_word, vec4};
 use crate::scene::{Pose, Velocity};
 use pgs_interface::record::{Beat, result};
 
@@ -29,11 +29,28 @@ pub(crate) fn decode(beats: &Record) -> (Pose, Velocity) {
 #[inline]
 pub(crate) fn of(pose: Pose, velocity: Velocity) -> Record {
     let mut beats = Record::default();
-    beats[result::POSITION] = vec3_and_word(pose.position, 0).into();
-    beats[result::ORIENTATION] = vec4(pose.orientation).into();
-    beats[result::LINEAR] = vec3_and_word(velocity.linear, 0).into();
-    beats[result::ANGULAR] = vec3_and_word(velocity.angular, 0).into();
+    beats[result::POSITION] = vec3_and_word(pose.position, 0);
+    beats[result::ORIENTATION] = vec4(pose.orientation);
+    beats[result::LINEAR] = vec3_and_word(velocity.linear, 0);
+    beats[result::ANGULAR] = vec3_and_word(velocity.angular, 0);
     beats
+}
+
+/// Whether all numbers of a record are finite. The words beside each vec3 are ignored.
+pub(crate) fn finite(record: &Record) -> bool {
+    all_finite(std::slice::from_ref(record))
+}
+
+/// Whether all numbers of all records are finite.
+pub(crate) fn all_finite(records: &[Record]) -> bool {
+    let (mut vec3, mut orientation) = (Magnitudes::default(), Magnitudes::default());
+    for record in records {
+        orientation.see(record[result::ORIENTATION]);
+        for row in [result::POSITION, result::LINEAR, result::ANGULAR] {
+            vec3.see(record[row]);
+        }
+    }
+    orientation.are_within(f32::MAX) & vec3.of_vec3_are_within(f32::MAX)
 }
 
 #[cfg(test)]
@@ -65,5 +82,18 @@ mod tests {
         assert_eq!(pose, Pose { position: [1.0, -2.0, 0.5], orientation: [0.5, -0.5, 0.25, 1.0] });
         assert_eq!(velocity, Velocity { linear: [3.0, 4.0, 5.0], angular: [6.0, 7.0, 8.0] });
         assert_eq!(of(pose, velocity), beats);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_found_wherever_it_is_and_nothing_else_is() {
+        let good = [Beat([f32::MAX, f32::MIN, -0.0, f32::from_bits(1)].map(f32::to_bits)); 4];
+        assert!(finite(&good));
+        for value in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN] {
+            for at in 0..16 {
+                let mut record = good;
+                record[at / 4].0[at % 4] = value.to_bits();
+                assert_eq!(finite(&record), [3, 11, 15].contains(&at), "{value} {at}");
+            }
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{CONTACT_POINTS, Collision};
+use super::CONTACT_POINTS;
+use pgs_interface::record::collision::FRICTION_BITS;
 
 /// The impulses of a collision, accumulated over the passes of a step, N s.
 ///
@@ -35,10 +36,11 @@ impl Impulses {
         }
     }
 
-    /// The impulses without elements behind the number of points, which count for nothing.
+    /// The impulses without elements behind the number of points in a collision's `count`, which
+    /// count for nothing.
     #[inline]
-    pub(crate) fn used(self, collision: &Collision) -> Self {
-        let points = collision.points() as usize;
+    pub(crate) fn used(self, count: u32) -> Self {
+        let points = (count & !FRICTION_BITS) as usize;
         if points == 0 {
             return Self::ZERO;
         }

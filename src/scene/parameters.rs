@@ -146,22 +146,24 @@ pub struct StepParameters {
     ///
     /// | the pipeline | order |
     /// |---|---|
-    /// | waits on hazards | [`Order::HazardFreeNearby`] without its empty entries, unless [`Order::AsGiven`] takes fewer cycles |
-    /// | does not wait | [`Order::HazardFreeNearby`] |
+    /// | has an issue queue | [`Order::Interleaved`] |
+    /// | waits on hazards | [`Order::HazardFree`] without its empty entries, unless [`Order::AsGiven`] takes fewer cycles |
+    /// | does not wait | [`Order::HazardFree`] |
     ///
     /// [`StepReport::order_choice`](crate::StepReport::order_choice) has the figures of the
     /// comparison.
     ///
     /// A pipeline that waits solves the collisions one after the other in the order sent; a hazard
-    /// costs it cycles. Another order is another valid solution: to compare with a sequential
-    /// solver choose [`Order::AsGiven`].
+    /// costs it cycles. An issue queue lets a collision that is free go first. Another order is
+    /// another valid solution: to compare with a sequential solver choose [`Order::AsGiven`], which
+    /// passes by the queue.
     ///
     /// A pipeline that does not wait reads stale velocities at every hazard and loses impulses:
     /// with any order that has hazards piles gain energy.
     pub order: Option<Order>,
     /// Whether to verify, before anything is sent, that no moving body recurs within the hazard
     /// window; a step with a hazard is refused. Without a choice of order, a pipeline that waits
-    /// then receives [`Order::HazardFreeNearby`] with its empty entries, which can be verified. For
+    /// then receives [`Order::HazardFree`] with its empty entries, which can be verified. For
     /// debugging: it takes host time, and memory anew in every step.
     pub verify_order: bool,
     /// Time limit of a step on the accelerator. `None` derives it from the work, as the sum of

@@ -8,7 +8,7 @@ use super::flight::PackedStep;
 use super::impulses::ImpulsesOut;
 use super::ordering::Ordering;
 use super::unique_id::UniqueId;
-use crate::beat::pack::pool::PackPool;
+use crate::beat::pool::PackPool;
 use crate::board::bank::{Bank, PerBank};
 use crate::board::cancellation::Cancellation;
 use crate::board::device::Device;

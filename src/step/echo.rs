@@ -18,6 +18,7 @@ use crate::board::symptom::Symptom;
 use crate::error::Error;
 use crate::platform::{Deadline, GuardPlatform, PlatformError};
 use crate::scene::{Body, Collision, Passes, StepParameters};
+use crate::validate::{Scene, SceneNeeds};
 
 /// Time limit of an echo. The driver polls without an interrupt after a quarter of it.
 pub(crate) const ECHO_LIMIT: Duration = Duration::from_millis(200);
@@ -97,15 +98,6 @@ impl Accelerator {
             }
         }
         let none: &[Collision] = &[];
-        let input = PackInput {
-            bodies: echo.bodies,
-            collisions: none,
-            added: None,
-            shapes: &self.shapes,
-            quick: None,
-            kinematic: false,
-        };
-        let (sent, _) = self.device.pack(&plan, bank, &input);
         let parameters = StepParameters {
             contact_iterations: 0,
             friction_iterations: 0,
@@ -113,6 +105,12 @@ impl Accelerator {
             deadline: Some(ECHO_LIMIT),
             ..StepParameters::default()
         };
+        let needs =
+            SceneNeeds { bodies: plan.bodies, collisions: 0, inertia: plan.variant.inertia };
+        let scene = &Scene::new(&self.shapes, needs, &plan.variant, &parameters);
+        let input = PackInput { bodies: echo.bodies, collisions: none, added: None, scene };
+        // Whatever the bodies are, the accelerator sends them back.
+        let (sent, ..) = self.device.pack(&plan, bank, &input);
         let deadline = Deadline::after(&*self.device.platform, ECHO_LIMIT);
         self.device.arm(&plan, bank, &parameters)?;
         self.device.start()?;
@@ -148,7 +146,7 @@ impl Accelerator {
 fn plan(bodies: usize, variant: Variant) -> Plan {
     let (collisions, passes) = (0, Passes::default());
     // The shapes of an echo fit every table.
-    Plan { bodies, collisions, passes, variant, streamed_masses: false }
+    Plan { bodies, collisions, passes, variant, streamed_masses: false, queued: false }
 }
 
 /// The MM2S channel that carried a beat of the results, and the beat's offset in the buffer of that

@@ -124,12 +124,10 @@ impl<'a> InFlight<'a> {
         let collision_of =
             |entry| schedule.map_or(Some(entry), |schedule: &Schedule| schedule.get(entry));
         let of_impulses = impulses_of(&device.s2mm, plan, *bank);
-        let (impulse_sum, broken) = impulses.read(plan, of_impulses, *given, collision_of);
+        let (impulse_sum, impulses_read) = impulses.read(plan, of_impulses, *given, collision_of);
         let (_, sent_sum) = ended.counters.sums;
         read(device, staged, (plan, *bank), bodies, (sent_sum, impulse_sum))?;
-        if let Some(collision) = broken {
-            return Err(Fault::ImpulseNotFinite { collision });
-        }
+        impulses_read?;
         flight.step.host.unpack = flight.watch.lap();
         Ok(())
     }
@@ -196,6 +194,7 @@ impl<'a> InFlight<'a> {
             collisions: *collisions as u64,
             order: order_summary.order,
             order_choice: order_summary.choice,
+            queued: plan.queued,
             empty: *empty as u64,
             verified: order_summary.verified,
             passes: u32::try_from(plan.passes.total()).unwrap_or(u32::MAX),

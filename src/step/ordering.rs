@@ -1,15 +1,14 @@
 //! Puts the collisions of a step in the order of sending.
 //!
 //! The caller's own order needs no work: the collisions are packed as they are, those without
-//! contact points as padding. For another order this module reads pairs, positions and masses into
-//! memory that it keeps from step to step, orders the collisions, and verifies on request that no
-//! hazard is left.
+//! contact points as padding. The interleaved order follows from their number. For the others this
+//! module reads pairs and masses into memory that it keeps from step to step, orders the
+//! collisions, and verifies on request that no hazard is left.
 
 use super::report::OrderChoice;
 use crate::control_block::Capabilities;
 use crate::order::{
-    Checker, InputBuffers, Interlock, IssueWindow, Order, OrderError, OrderInput, OrderReport,
-    Orderer, Schedule,
+    Checker, InputBuffers, Interlock, IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule,
 };
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
 use crate::validate::{Excess, InputError, Limits, SceneNeeds, needed};
@@ -31,18 +30,20 @@ pub(super) struct OrderSummary {
     pub(super) choice: OrderChoice,
     /// Whether there is a schedule; without one the collisions stay as given.
     pub(super) scheduled: bool,
-    /// Number of collisions without contact points, which no entry of the schedule holds; 0 without
-    /// a schedule.
-    pub(super) empty: usize,
-    /// The measured properties of the order, if it was to be verified.
-    pub(super) verified: Option<OrderReport>,
+    /// Number of collisions without contact points, if no entry of the schedule holds them; else
+    /// they are sent as padding.
+    pub(super) empty: Option<usize>,
+    /// Whether the order was verified: it has no hazard.
+    pub(super) verified: bool,
+    /// Whether the step goes through the board's issue queue.
+    pub(super) queued: bool,
 }
 
 impl OrderSummary {
     /// The summary of collisions that are sent as the caller gives them.
-    pub(super) const fn as_given(choice: OrderChoice) -> Self {
+    pub(super) const fn as_given(choice: OrderChoice, queued: bool) -> Self {
         let order = Order::AsGiven;
-        Self { order, choice, scheduled: false, empty: 0, verified: None }
+        Self { order, choice, scheduled: false, empty: None, verified: false, queued }
     }
 }
 
@@ -79,7 +80,13 @@ impl Ordering {
                 return self.cheapest(bodies, collisions, parameters, context);
             }
             OrderRequest::Order(Order::AsGiven, choice) if !parameters.verify_order => {
-                return Ok(OrderSummary::as_given(choice));
+                return Ok(OrderSummary::as_given(choice, false));
+            }
+            OrderRequest::Order(order @ Order::Interleaved, choice) if !parameters.verify_order => {
+                let queued = context.capabilities.queue > 0;
+                self.orderer.interleave(collisions.len());
+                let (scheduled, empty, verified) = (true, None, false);
+                return Ok(OrderSummary { order, choice, scheduled, empty, verified, queued });
             }
             OrderRequest::Order(order, choice) => (order, choice),
         };
@@ -95,15 +102,13 @@ impl Ordering {
             Err(error) => return Err(error.into()),
         }
         let schedule = self.orderer.schedule();
-        let verified = match parameters.verify_order {
-            true => {
-                self.checker.verify(schedule, &input, window)?;
-                Some(OrderReport::measure(schedule, &input, window)?)
-            }
-            false => None,
-        };
-        let order = self.orderer.made();
-        Ok(OrderSummary { order, choice, scheduled: true, empty, verified })
+        let verified = parameters.verify_order;
+        if verified {
+            self.checker.verify(schedule, &input, window)?;
+        }
+        let queued = order != Order::AsGiven && context.capabilities.queue > 0;
+        let empty = (order != Order::Interleaved).then_some(empty);
+        Ok(OrderSummary { order, choice, scheduled: true, empty, verified, queued })
     }
 
     /// Orders the collisions of a step for a pipeline that waits on hazards. Picks the order that
@@ -120,16 +125,17 @@ impl Ordering {
         // A window that is too large for the orderer leaves the order as given.
         let window = IssueWindow::of(context.capabilities).ok();
         let pipeline = Interlock::of(context.capabilities, parameters);
-        let costs = self.orderer.cheapest(&input, window, &pipeline)?;
-        let (order, choice) = (self.orderer.made(), OrderChoice::Cheapest(costs));
+        let (order, costs) = self.orderer.cheapest(&input, window, &pipeline)?;
+        let choice = OrderChoice::Cheapest(costs);
         let empty = input.pairs.len() - input.collisions();
         if order == Order::AsGiven {
             if empty == 0 {
-                return Ok(OrderSummary::as_given(choice));
+                return Ok(OrderSummary::as_given(choice, false));
             }
             self.orderer.as_given_without_empty(&input);
         }
-        Ok(OrderSummary { order, choice, scheduled: true, empty, verified: None })
+        let (scheduled, empty) = (true, Some(empty));
+        Ok(OrderSummary { order, choice, scheduled, empty, verified: false, queued: false })
     }
 
     /// The schedule of the last order.
@@ -152,12 +158,11 @@ impl OrderRequest {
         match parameters.order {
             Some(order) => Self::Order(order, OrderChoice::Asked),
             None if !capabilities.interlocked => {
-                Self::Order(Order::HazardFreeNearby, OrderChoice::NoInterlock)
+                Self::Order(Order::HazardFree, OrderChoice::NoInterlock)
             }
             // Only an order that keeps its empty entries can be verified.
-            None if parameters.verify_order => {
-                Self::Order(Order::HazardFreeNearby, OrderChoice::Asked)
-            }
+            None if parameters.verify_order => Self::Order(Order::HazardFree, OrderChoice::Asked),
+            None if capabilities.queue > 0 => Self::Order(Order::Interleaved, OrderChoice::Queue),
             None => Self::Cheapest,
         }
     }

@@ -8,14 +8,13 @@ use super::report::HostTimes;
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
 use super::unique_id::UniqueId;
-use crate::beat::pack::collisions::Seen;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
 use crate::error::Error;
 use crate::order::Ordered;
 use crate::scene::{Bodies, Collisions, Shape, StepParameters};
-use crate::validate::{InputError, Limits, Quick, Scene, preflight, validate};
+use crate::validate::{InputError, Limits, Scene, preflight, validate};
 
 /// The caller's arguments of a step, with the board's shapes and limits.
 struct Input<'a, B: ?Sized, C: ?Sized> {
@@ -61,29 +60,29 @@ impl<'a, B: Bodies + ?Sized, C: Collisions + ?Sized> Input<'a, B, C> {
             passes: self.parameters.passes(),
             variant: self.limits.variant,
             streamed_masses: device.capabilities.streams_masses(self.shapes.len()),
+            queued: order_summary.queued,
         }
     }
 
-    /// Writes the records into the bank. Returns what the screening saw of the input.
+    /// Writes the records into the bank. Returns the sums, whether the checks passed all input, and
+    /// the number of paddings.
     fn pack(
         &self,
         device: &mut Device,
         (ordering, order_summary): (&Ordering, &OrderSummary),
         (plan, bank): (&Plan, Bank),
-        scene: Scene<'a>,
-    ) -> (SentSums, Seen) {
-        let Self { bodies, collisions, shapes, .. } = *self;
-        let kinematic = scene.kinematic;
-        let quick = Quick::new(scene);
-        let quick = Some(&quick);
+        scene: &Scene<'a>,
+    ) -> (SentSums, bool, usize) {
+        let Self { bodies, collisions, .. } = *self;
         if order_summary.scheduled {
             let schedule = ordering.schedule();
-            let added = Some(plan.collisions.saturating_sub(schedule.collisions()));
+            let added = plan.collisions.saturating_sub(schedule.collisions());
+            let added = order_summary.empty.map(|_| added);
             let collisions = &Ordered { collisions, schedule };
-            let input = PackInput { bodies, collisions, added, shapes, quick, kinematic };
+            let input = PackInput { bodies, collisions, added, scene };
             device.pack(plan, bank, &input)
         } else {
-            let input = PackInput { bodies, collisions, added: None, shapes, quick, kinematic };
+            let input = PackInput { bodies, collisions, added: None, scene };
             device.pack(plan, bank, &input)
         }
     }
@@ -114,9 +113,10 @@ impl Accelerator {
         let plan = input.plan(ordering, &order_summary, device);
         let given = collisions.len();
         let ordered = ordering.schedule().collisions();
-        let all_sent = !order_summary.scheduled || ordered + order_summary.empty == given;
+        let all_sent =
+            !order_summary.scheduled || ordered + order_summary.empty.unwrap_or(0) == given;
         let cancelled = engines == Engines::Idle && device.check_cancelled().is_err();
-        // Packing screens everything that it sends. The full check is for the rest: input that is
+        // Packing checks everything that it sends. The full check is for the rest: input that is
         // not sent, and input whose error another error would hide.
         if !all_sent || plan.bodies == 0 || cancelled || !device.has_room(&plan, bank) {
             input.check_all()?;
@@ -126,21 +126,21 @@ impl Accelerator {
 
         let (mut sent, mut paddings) = (None, 0);
         if plan.bodies > 0 {
-            let (sums, seen) = input.pack(device, (ordering, &order_summary), (&plan, bank), scene);
-            if !seen.good {
+            let order = (ordering, &order_summary);
+            let (sums, good, padded) = input.pack(device, order, (&plan, bank), &scene);
+            if !good {
                 input.check_all()?;
                 // The input is right now, and was not right when it was packed.
                 return Err(InputError::Unsteady.into());
             }
-            (sent, paddings) = (Some(sums), seen.paddings);
+            (sent, paddings) = (Some(sums), padded);
         }
         host.pack = watch.lap();
 
-        let without_points = match (sent, order_summary.scheduled) {
+        let without_points = match sent {
             // Nothing could move, so that validation has refused every other collision.
-            (None, _) => given,
-            (Some(_), true) => order_summary.empty,
-            (Some(_), false) => paddings,
+            None => given,
+            Some(_) => order_summary.empty.unwrap_or(paddings),
         };
         Ok(self.keep(PackedStep {
             id: UniqueId::new(),

@@ -5,19 +5,17 @@ use std::ops::Range;
 use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 
-use crate::beat::pack::bodies::pack_bodies;
-use crate::beat::pack::collisions::{Entries, Seen, pack_collisions};
-use crate::beat::pack::impulses::{WarmSegments, WarmSums, pack_warm};
-use crate::beat::pack::target::Target;
-use crate::beat::pack::writer::{Writer, Written};
+use crate::beat::Target;
+use crate::beat::bodies::{Survey, pack_bodies};
+use crate::beat::collisions::{Entries, Packed, pack_collisions};
+use crate::beat::impulses::{WarmSegments, WarmSums};
+use crate::beat::writer::{Writer, Written};
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
 use crate::board::port::Port;
-use crate::record::body_table::Survey;
-use crate::scene::{Bodies, Collisions, Shape, Velocity};
-use crate::validate::InputError;
-use crate::validate::Quick;
+use crate::scene::{Bodies, Collisions, Velocity};
+use crate::validate::{InputError, Scene};
 
 /// Sums of the words that a step sends, for comparison with the accelerator's sum.
 #[derive(Debug, Clone, Copy)]
@@ -37,67 +35,55 @@ pub(super) struct PackInput<'a, B: ?Sized, C: ?Sized> {
     pub(super) collisions: &'a C,
     /// Number of empty entries that the order added; `None` without a schedule.
     pub(super) added: Option<usize>,
-    pub(super) shapes: &'a [Shape],
-    /// Screens the input during packing.
-    pub(super) quick: Option<&'a Quick<'a>>,
-    /// Whether static bodies may move.
-    pub(super) kinematic: bool,
+    /// Checks the input during packing.
+    pub(super) scene: &'a Scene<'a>,
 }
 
 impl Device {
     /// Writes the records of a step into the buffers of a bank. Returns the sums of the words,
-    /// whether the screening passed all input, and the number of paddings.
+    /// whether the checks passed all input, and the number of paddings.
     pub(super) fn pack<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
         input: &PackInput<'_, B, C>,
-    ) -> (SentSums, Seen) {
-        let PackInput { bodies, collisions, added, shapes, quick, kinematic } = *input;
+    ) -> (SentSums, bool, usize) {
+        let PackInput { bodies, collisions, added, scene } = *input;
         let SegmentBuffers { mut velocities, mut poses, mut entries, warm } =
             SegmentBuffers::of(&mut self.mm2s, plan, bank);
         let active = ..plan.channels();
         let velocities = &mut velocities[active];
         let poses = &mut poses[active];
-        let target =
-            Target { variant: &plan.variant, shapes, streamed_masses: plan.streamed_masses, quick };
+        let target = Target { scene, streamed_masses: plan.streamed_masses };
         let packers = &mut self.packers;
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, bodies_passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), packers);
-        if kinematic {
+        if scene.kinematic {
             self.statics[bank].retain(|body| rests(bodies, *body));
         }
         let of_entries = Entries { collisions, count: plan.collisions, added };
-        let (collisions, mut seen) =
-            pack_collisions(target, self.ends.ends(), &of_entries, &mut entries[active], packers);
-        seen.good &= bodies_passed;
-        let warm = warm.map(|(channel, segments)| {
-            let entries = (of_entries.collisions, of_entries.count);
-            let warm =
-                pack_warm(&plan.variant, channel, self.ends.ends(), entries, segments, packers);
-            // The caller's collisions must answer as they did when they were screened.
-            seen.good &= !warm.broken && warm.records == collisions;
-            warm
-        });
-        let warm = warm.unwrap_or_default();
-        (SentSums { velocities, collisions, warm, poses }, seen)
+        let (ends, entries) = (self.ends.ends(), &mut entries[active]);
+        let packed = pack_collisions(target, ends, &of_entries, entries, warm, packers);
+        let Packed { sum: collisions, warm, good, paddings } = packed;
+        (SentSums { velocities, collisions, warm, poses }, good & bodies_passed, paddings)
     }
 
     /// Writes the records of a step whose collisions `narrow_phase` writes one after the other.
     /// Returns the sums of the words, unless the step has no bodies, and the written collisions.
-    /// `refuse` names the error of a body that the screening doubts.
+    /// `refuse` names the error of a body that the checks refuse.
     pub(super) fn pack_written<B: Bodies + ?Sized>(
         &mut self,
         plan: &Plan,
         bank: Bank,
         target: Target<'_>,
-        (bodies, kinematic): (&B, bool),
+        bodies: &B,
         refuse: impl FnOnce() -> Result<(), InputError>,
         narrow_phase: impl FnOnce(&mut Writer<'_>),
     ) -> Result<(Option<SentSums>, Written), InputError> {
         if plan.bodies == 0 {
-            let mut writer = Writer::without_bodies(target, self.ends.ends(), plan.collisions);
+            let mut writer =
+                Writer::without_bodies(target.scene, self.ends.ends(), plan.collisions);
             narrow_phase(&mut writer);
             return Ok((None, writer.finish()?));
         }
@@ -109,7 +95,7 @@ impl Device {
         let into = Survey { ends: &mut self.ends, statics: &mut self.statics[bank] };
         let (velocities, poses, passed) =
             pack_bodies(target, bodies, plan.bodies, into, (velocities, poses), &mut self.packers);
-        if kinematic {
+        if target.scene.kinematic {
             self.statics[bank].retain(|body| rests(bodies, *body));
         }
         if !passed {
@@ -117,7 +103,7 @@ impl Device {
             return Err(InputError::Unsteady);
         }
         let (ends, entries) = (self.ends.ends(), &mut entries[active]);
-        let mut writer = Writer::new(target, ends, plan.collisions, entries);
+        let mut writer = Writer::new(target.scene, ends, plan.collisions, entries);
         narrow_phase(&mut writer);
         let written = writer.finish()?;
         let warm = WarmSums::default();
@@ -136,8 +122,8 @@ struct SegmentBuffers<'a> {
     velocities: [&'a mut [Beat]; DMA_COUNT_MAX],
     poses: [&'a mut [Beat]; DMA_COUNT_MAX],
     entries: [&'a mut [Beat]; DMA_COUNT_MAX],
-    /// The channel that carries impulses, and its segments of the warm passes.
-    warm: Option<(usize, WarmSegments<'a>)>,
+    /// The segments of the warm passes on the channel that carries impulses.
+    warm: Option<WarmSegments<'a>>,
 }
 
 impl<'a> SegmentBuffers<'a> {
@@ -159,7 +145,7 @@ impl<'a> SegmentBuffers<'a> {
                 };
                 let contact = taken(&segments.warm_contact);
                 let friction = taken(&segments.warm_friction);
-                warm = Some((place, WarmSegments { contact, friction }));
+                warm = Some(WarmSegments { channel: place, contact, friction });
             }
         }
         Self { velocities, poses, entries, warm }

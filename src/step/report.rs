@@ -6,7 +6,7 @@ use pgs_interface::control::IMPULSE_SUM_MAX;
 
 use crate::control_block::time_of;
 use crate::control_block::{Saturated, impulse};
-use crate::order::{Order, OrderCosts, OrderReport};
+use crate::order::{Order, OrderCosts};
 
 /// Clock cycles of a step on the accelerator, by their use.
 ///
@@ -69,7 +69,9 @@ pub enum OrderChoice {
     Asked,
     /// The board does not wait on hazards. Only an order without hazards is solved right.
     NoInterlock,
-    /// The board waits on hazards. This order takes the fewest cycles of two: the order as given
+    /// The board has an issue queue, which keeps hazards apart.
+    Queue,
+    /// The board waits on hazards, and has no queue. This order takes the fewest cycles of two: the order as given
     /// and the order without hazards.
     Cheapest(OrderCosts),
 }
@@ -82,17 +84,20 @@ pub struct StepReport {
     pub bodies: u64,
     /// Number of collisions with contact points.
     pub collisions: u64,
-    /// The order in which the collisions were sent. [`Order::HazardFree`] where
-    /// [`Order::HazardFreeNearby`] gave way to it ([`Orderer::made`](crate::order::Orderer::made)).
+    /// The order in which the collisions were sent.
     pub order: Order,
+    /// Whether the collisions went through the board's issue queue, which solves them in another
+    /// order where they meet hazards.
+    pub queued: bool,
     /// The reason for this order.
     pub order_choice: OrderChoice,
     /// Empty entries between the collisions, sent as collisions without contact points: the entries
-    /// that the order added, and in the order as given the caller's own collisions of count 0.
+    /// that [`Order::HazardFree`] added, and in the other orders the caller's own collisions of
+    /// count 0.
     pub empty: u64,
-    /// The proof of the order, if it was to be [verified](crate::StepParameters::verify_order): no
-    /// hazards, the number of bodies alive at once, and the length of their lives.
-    pub verified: Option<OrderReport>,
+    /// Whether the order was to be [verified](crate::StepParameters::verify_order), and has no
+    /// hazard.
+    pub verified: bool,
     /// Passes over the collisions: contact and friction iterations.
     pub passes: u32,
     /// Clock cycles, as the accelerator counted them.
@@ -175,8 +180,9 @@ mod tests {
             collisions: 0,
             order: Order::AsGiven,
             order_choice: OrderChoice::Asked,
+            queued: false,
             empty: 0,
-            verified: None,
+            verified: false,
             passes: 0,
             cycles: StepCycles { total: work + stalls + waits, work, stalls, waits },
             clock_khz: 275_000,

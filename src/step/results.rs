@@ -8,17 +8,16 @@ use pgs_interface::stripe::IMPULSES_STREAM;
 
 use super::packing::SentSums;
 use crate::axi_dma::Direction;
-use crate::beat::pack::pool::PackPool;
+use crate::beat::pool::PackPool;
+use crate::beat::results::read_all;
 use crate::beat::stripe::Layout;
-use crate::beat::unpack::results::read_all;
 use crate::board::bank::Bank;
 use crate::board::device::Device;
 use crate::board::plan::Plan;
 use crate::board::port::Port;
 use crate::control_block::Counters;
 use crate::fault::Fault;
-use crate::record::finite::finite;
-use crate::record::result::{self, Record};
+use crate::record::result::{self, Record, finite};
 use crate::scene::Bodies;
 
 /// Compares the accelerator's sum of the words that it received with the driver's.

@@ -11,14 +11,13 @@ use super::report::{HostTimes, OrderChoice};
 use super::reserve::{refuse, reserve};
 use super::stopwatch::Stopwatch;
 use super::unique_id::UniqueId;
-use crate::beat::pack::target::Target;
-use crate::beat::pack::writer::Writer;
+use crate::beat::Target;
+use crate::beat::writer::Writer;
 use crate::board::bank::Bank;
 use crate::board::plan::Plan;
 use crate::error::Error;
 use crate::scene::{Bodies, Collision, Collisions, StepParameters};
-use crate::validate::InputError;
-use crate::validate::{Quick, preflight, validate};
+use crate::validate::{InputError, preflight, validate};
 
 impl Accelerator {
     /// Packs a step whose collisions `narrow_phase` writes, at most `announced` of them. Their
@@ -113,22 +112,23 @@ impl Accelerator {
         let variant = limits.variant;
         let passes = parameters.passes();
         let streamed_masses = device.capabilities.streams_masses(shapes.len());
-        let mut plan =
-            Plan { bodies: bodies.len(), collisions: announced, passes, variant, streamed_masses };
+        // A caller who names no order leaves it to the queue.
+        let queued = parameters.order.is_none() && device.capabilities.queue > 0;
+        let mut plan = Plan {
+            bodies: bodies.len(),
+            collisions: announced,
+            passes,
+            variant,
+            streamed_masses,
+            queued,
+        };
         reserve((&mut *device, packed), shapes, (&plan, bank), engines)
             .map_err(|symptom| refuse(device, shapes, symptom, engines))?;
 
-        let quick = Quick::new(scene);
-        let target = Target { variant: &variant, shapes, streamed_masses, quick: Some(&quick) };
+        let target = Target { scene: &scene, streamed_masses };
         let check_bodies = || validate(bodies, &Announced(0), shapes, parameters, limits);
-        let (sent, written) = device.pack_written(
-            &plan,
-            bank,
-            target,
-            (bodies, parameters.kinematic),
-            check_bodies,
-            narrow_phase,
-        )?;
+        let (sent, written) =
+            device.pack_written(&plan, bank, target, bodies, check_bodies, narrow_phase)?;
         plan.collisions = if sent.is_some() { written.collisions } else { 0 };
         host.pack = watch.lap();
         Ok(self.keep(PackedStep {
@@ -141,7 +141,7 @@ impl Accelerator {
             given: written.collisions,
             collisions: written.collisions - written.paddings,
             empty: if sent.is_some() { written.paddings } else { 0 },
-            order_summary: OrderSummary::as_given(OrderChoice::Asked),
+            order_summary: OrderSummary::as_given(OrderChoice::Asked, queued),
             shapes_loaded: self.shapes_loaded,
             host,
         }))

@@ -1,10 +1,12 @@
 //! Refuses bodies that no bitstream can solve, or that this one cannot hold.
 
+use std::ops::RangeInclusive;
+
 use pgs_interface::number::StreamFormat;
 
 use super::range::Held;
 use super::{Excess, InputError, InputItem, OutOfRange, Scene, all_within, first};
-use crate::scene::Body;
+use crate::scene::{Body, Shape};
 
 const LINEAR: &str = "linear velocity";
 const ANGULAR: &str = "angular velocity";
@@ -17,12 +19,11 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
             return Err(number_refused(index, body, (field, values, format), scene));
         }
     }
-    let [x, y, z, w] = body.pose.orientation;
-    let length = (x * x + y * y + z * z + w * w).sqrt();
-    if !(InputError::SHORTEST_ORIENTATION..=f32::MAX).contains(&length) {
+    let length = length(body.pose.orientation);
+    if !LENGTHS.contains(&length) {
         return Err(InputError::Orientation { body: index, length });
     }
-    let Some(shape) = scene.shapes.get(shape_of(body)) else {
+    let Some(shape) = scene.shape_of(body) else {
         let shapes = scene.shapes.len();
         return Err(InputError::ShapeIndex { body: index, found: body.shape, shapes });
     };
@@ -35,6 +36,27 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
         }
     }
     Ok(())
+}
+
+/// The lengths that an orientation may have.
+const LENGTHS: RangeInclusive<f32> = InputError::SHORTEST_ORIENTATION..=f32::MAX;
+
+/// The length of an orientation.
+#[inline(always)]
+fn length([x, y, z, w]: [f32; 4]) -> f32 {
+    (x * x + y * y + z * z + w * w).sqrt()
+}
+
+impl Scene<'_> {
+    /// Whether [`check_body`] accepts a body of this shape, apart from the limits on its numbers.
+    #[inline(always)]
+    pub(crate) fn accepts_body(&self, body: &Body, shape: Option<&Shape>) -> bool {
+        let Some(shape) = shape else { return false };
+        let speeds = [body.velocity.linear, body.velocity.angular];
+        let rests = || speeds.as_flattened().iter().all(|speed| *speed == 0.0);
+        LENGTHS.contains(&length(body.pose.orientation))
+            && (!shape.is_static() || self.kinematic || rests())
+    }
 }
 
 /// A field of a body: name, values, format.
@@ -71,11 +93,6 @@ fn number_refused(
         let fields = fields(body, &Held::by(&variant.numbers));
         fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
     })
-}
-
-/// The shape of a body as an index. An index beyond `usize` saturates, and is in no table.
-pub(crate) fn shape_of(body: &Body) -> usize {
-    usize::try_from(body.shape).unwrap_or(usize::MAX)
 }
 
 #[cfg(test)]

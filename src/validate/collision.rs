@@ -1,18 +1,18 @@
 //! Refuses collisions that no bitstream can solve.
 
-use super::InputError;
-use super::{all_within, first};
+use super::{InputError, Scene, all_within, first};
 use crate::record::FULL;
+use crate::record::body_table::End;
 use crate::scene::{CONTACT_POINTS, Collision, Contact};
 
-/// Checks a collision with contact points, without its bodies; returns their indices. With
-/// `pair_friction` it has a friction of its own.
+/// Checks a collision with contact points, without its bodies; returns their indices. `points` is
+/// its number of [points](Scene::points).
 #[inline]
 pub(crate) fn check_collision(
     index: usize,
     collision: &Collision,
     bodies: usize,
-    pair_friction: bool,
+    points: u32,
 ) -> Result<(usize, usize), InputError> {
     let body = |side: char, found: u32| match usize::try_from(found) {
         Ok(body) if body < bodies => Ok(body),
@@ -22,7 +22,6 @@ pub(crate) fn check_collision(
     if pair.0 == pair.1 {
         return Err(InputError::SelfCollision { collision: index, body: collision.body_a });
     }
-    let points = if pair_friction { collision.points() } else { collision.count };
     if points != collision.points() && (1..=FULL).contains(&collision.points()) {
         return Err(InputError::OwnFriction { collision: index });
     }
@@ -40,9 +39,7 @@ pub(crate) fn check_collision(
         let (component, found) = first(&collision.normal, |value| !value.is_finite());
         return Err(InputError::NormalNotFinite { collision: index, component, found });
     }
-    let [x, y, z] = collision.normal;
-    let length = (x * x + y * y + z * z).sqrt();
-    if (length - 1.0).abs() > InputError::NORMAL_TOLERANCE {
+    if !is_unit(collision.normal) {
         return Err(normal_length(index, collision.normal));
     }
     // All four points without a branch: counts follow no pattern that could be predicted.
@@ -54,6 +51,33 @@ pub(crate) fn check_collision(
         return Err(contact_not_finite(index, &collision.contacts[..count]));
     }
     Ok(pair)
+}
+
+/// Whether a normal has the length 1; not if a number of it is not finite.
+#[inline(always)]
+fn is_unit([x, y, z]: [f32; 3]) -> bool {
+    ((x * x + y * y + z * z).sqrt() - 1.0).abs() <= InputError::NORMAL_TOLERANCE
+}
+
+impl Scene<'_> {
+    /// The number of contact points; unless each collision has its own friction, a friction counts
+    /// as a part of it. A record masks the points from this number on.
+    #[inline(always)]
+    pub(crate) const fn points(&self, collision: &Collision) -> u32 {
+        collision.count & self.points
+    }
+
+    /// Whether validation accepts a collision with contact points, apart from the limits on the
+    /// numbers of its points, and from its [rows](Self::rows_fit). It has this number of
+    /// [points](Self::points), and its bodies A and B have these ends.
+    #[inline(always)]
+    pub(crate) fn accepts(&self, collision: &Collision, points: u32, [a, b]: [&End; 2]) -> bool {
+        is_unit(collision.normal)
+            & (points <= FULL)
+            & collision.has_finite_friction()
+            & (collision.body_a != collision.body_b)
+            & a.may_touch(b)
+    }
 }
 
 /// The error for a normal that is not of unit length.
@@ -108,25 +132,26 @@ mod tests {
         assert_eq!(empty.with_friction(0.5).count, 0);
         let negative = COLLISION.with_friction(-0.5);
         assert!(matches!(
-            check_collision(5, &negative, 3, true),
+            check_collision(5, &negative, 3, negative.points()),
             Err(InputError::FrictionNotFinite { collision: 5, .. })
         ));
-        assert_eq!(check_collision(5, &own, 3, true), Ok((2, 0)));
+        assert_eq!(check_collision(5, &own, 3, own.points()), Ok((2, 0)));
         let refused = InputError::OwnFriction { collision: 5 };
-        assert_eq!(check_collision(5, &own, 3, false), Err(refused));
+        assert_eq!(check_collision(5, &own, 3, own.count), Err(refused));
         let found = f32::INFINITY;
+        let infinite = COLLISION.with_friction(7e4);
         assert_eq!(
-            check_collision(5, &COLLISION.with_friction(7e4), 3, true),
+            check_collision(5, &infinite, 3, infinite.points()),
             Err(InputError::FrictionNotFinite { collision: 5, found })
         );
         // The sign bit is none of the friction's.
         let negative = Collision { count: own.count | 1 << 31, ..own };
         let refused = InputError::ContactCount { collision: 5, found: negative.count };
-        assert_eq!(check_collision(5, &negative, 3, true), Err(refused));
+        assert_eq!(check_collision(5, &negative, 3, negative.points()), Err(refused));
     }
 
     fn refused(collision: &Collision) -> InputError {
-        check_collision(5, collision, 3, false).expect_err("a collision to be refused")
+        check_collision(5, collision, 3, collision.count).expect_err("a collision to be refused")
     }
 
     #[test]
@@ -143,7 +168,7 @@ mod tests {
 
     #[test]
     fn what_an_unused_contact_point_holds_does_not_matter() {
-        assert_eq!(check_collision(0, &COLLISION, 3, false), Ok((2, 0)));
+        assert_eq!(check_collision(0, &COLLISION, 3, COLLISION.count), Ok((2, 0)));
     }
 
     #[test]
@@ -173,7 +198,7 @@ mod tests {
         let contacts = [USED; 4];
         for count in 1..=4 {
             let collision = Collision { count, contacts, ..COLLISION };
-            assert_eq!(check_collision(5, &collision, 3, false), Ok((2, 0)));
+            assert_eq!(check_collision(5, &collision, 3, collision.count), Ok((2, 0)));
         }
         for found in [5, 0x1_0000, 0x7FFF_0000, u32::MAX] {
             assert_eq!(
@@ -215,7 +240,7 @@ mod tests {
         );
         for length in [0.999_1, 1.000_9] {
             let collision = Collision { normal: [0.0, 0.0, length], ..COLLISION };
-            assert_eq!(check_collision(5, &collision, 3, false), Ok((2, 0)));
+            assert_eq!(check_collision(5, &collision, 3, collision.count), Ok((2, 0)));
         }
     }
 

@@ -156,6 +156,48 @@ pub enum InputError {
         collision: usize,
     },
 
+    /// A collision names a place that the last step did not have.
+    #[error(
+        "collision {collision}: its place in the last step is {found}, but that step had {limit} \
+         collisions, counted from 0: correct it, or give the place of a new one, {new}",
+        new = u32::MAX
+    )]
+    CollisionPlace {
+        /// The collision.
+        collision: usize,
+        /// The index that its place has.
+        found: u32,
+        /// Collisions of the last step that was committed.
+        limit: u32,
+    },
+
+    /// A contact point names a place that no collision has.
+    #[error(
+        "collision {collision}, contact point {contact}: its place in the last step is {found}, \
+         expected a point below {CONTACT_POINTS}, or {new} for a new one: correct it",
+        new = u8::MAX
+    )]
+    PointPlace {
+        /// The collision.
+        collision: usize,
+        /// The contact point.
+        contact: usize,
+        /// The index that its place has.
+        found: u8,
+    },
+
+    /// The impulses to keep are not the ones of these collisions.
+    #[error(
+        "found {found} impulses of {expected} collisions: commit a step that gave its impulses out \
+         (`StepParameters::impulses_out`), with the collisions that it was given"
+    )]
+    OtherImpulses {
+        /// Impulses given.
+        found: usize,
+        /// Collisions given.
+        expected: usize,
+    },
+
     /// A body refers to a shape that was not set.
     #[error(
         "body {body}: its shape is {found}, but the table has {shapes} shapes, counted from 0: \

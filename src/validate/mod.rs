@@ -1,19 +1,17 @@
 //! Refuses bad input before anything is sent.
 //!
 //! `validate` makes one pass over the bodies and one over the collisions. A board of the same
-//! capacities accepts every step that passes. Packing screens its input block by block (`Quick`)
-//! and calls `validate` only for the error of a block that it refuses.
+//! capacities accepts every step that passes. Packing checks each record as it writes it, by the
+//! same rules without words ([`Scene::accepts`], [`Scene::accepts_body`], and a limit on all
+//! numbers), and calls `validate` only for the error of input that it refuses.
 
 mod body;
 pub(crate) mod capable_profiles;
 mod collision;
 pub(crate) mod error;
 mod excess;
-mod look;
 mod parameters;
-mod quick;
 mod range;
-mod reach;
 mod rows;
 mod shape;
 
@@ -21,22 +19,20 @@ pub use capable_profiles::CapableProfiles;
 pub(crate) use capable_profiles::SceneNeeds;
 pub use error::InputError;
 pub use excess::{Excess, InputItem, OutOfRange};
-pub(crate) use look::Look;
-pub(crate) use quick::{Block, Quick};
-pub(crate) use range::largest_impulse;
-pub(crate) use reach::Locations;
 pub(crate) use shape::{needed, validate_shapes};
 
-use self::body::{check_body, shape_of};
+use self::body::check_body;
 use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_impulses, check_range};
 use self::rows::Rows;
 use self::shape::check_shapes;
 use crate::control_block::Capabilities;
-use crate::scene::{Bodies, Collision, Collisions, Shape, StepParameters};
+use crate::record::body_table::Ends;
+use crate::scene::{Bodies, Body, Collision, Collisions, Shape, StepParameters};
 use pgs_interface::number::{Precision, StreamFormat};
 use pgs_interface::profile::Variant;
+use pgs_interface::record::collision as layout;
 
 /// The capacities and formats of a bitstream, as far as they limit the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,8 +94,8 @@ impl Limits {
 
 /// Checks the whole input of a step.
 ///
-/// Of a collision of count 0 nothing else is looked at. A step without bodies needs no shapes, and
-/// fits every board.
+/// A collision of count 0 is right, whatever its other words. A step without bodies needs no
+/// shapes, and fits every board.
 ///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
@@ -117,13 +113,13 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     // A body without a shape was refused above.
     let end = |index: usize| {
         let body = bodies.body(index);
-        (body.pose.position, shapes.get(shape_of(&body)).unwrap_or(&Shape::STATIC))
+        (body.pose.position, scene.shape_of(&body).unwrap_or(&Shape::STATIC))
     };
     for index in 0..scene.needs.collisions {
         let collision = collisions.collision(index);
         check_whole(index, &collision, end, &scene)?;
         if parameters.warm_start {
-            check_impulses(index, &collisions.impulses(index).used(&collision), &scene)?;
+            check_impulses(index, &collisions.impulses(index).used(collision.count), &scene)?;
         }
     }
     Ok(())
@@ -152,10 +148,7 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
         check_room(&needs, limits)?;
         check_shapes(shapes, &needs, limits)?;
     }
-    let held = Held::by(&limits.variant.numbers);
-    let StepParameters { kinematic, pair_friction, .. } = *parameters;
-    let variant = &limits.variant;
-    Ok(Scene { shapes, needs, variant, held, kinematic, pair_friction })
+    Ok(Scene::new(shapes, needs, &limits.variant, parameters))
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
@@ -170,7 +163,7 @@ fn check_whole<'a>(
         return Ok(());
     }
     let (body_a, body_b) =
-        check_collision(index, collision, scene.needs.bodies, scene.pair_friction)?;
+        check_collision(index, collision, scene.needs.bodies, scene.points(collision))?;
     let [(a, shape_a), (b, shape_b)] = [end(body_a), end(body_b)];
     let (positions, shapes) = ([a, b], [shape_a, shape_b]);
     let moves = shapes.map(|shape| !shape.is_static());
@@ -183,7 +176,7 @@ fn check_whole<'a>(
         return Ok(());
     }
     check_range(index, collision, positions, scene)?;
-    if scene.variant.numbers.rows == Precision::Binary16 {
+    if scene.computes_short_rows() {
         Rows { index, collision, positions, shapes }.check(scene)?;
     }
     Ok(())
@@ -192,14 +185,59 @@ fn check_whole<'a>(
 /// The context in which bodies and collisions are checked.
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
-    shapes: &'a [Shape],
+    pub(crate) shapes: &'a [Shape],
     needs: SceneNeeds,
-    variant: &'a Variant,
-    held: Held,
+    pub(crate) variant: &'a Variant,
+    pub(crate) held: Held,
     /// Whether static bodies may move.
     pub(crate) kinematic: bool,
-    /// Whether each collision has a friction of its own.
-    pair_friction: bool,
+    /// The bits of a collision's count that are its number of [points](Self::points).
+    points: u32,
+}
+
+impl<'a> Scene<'a> {
+    /// The context of a step with these parameters.
+    pub(crate) fn new(
+        shapes: &'a [Shape],
+        needs: SceneNeeds,
+        variant: &'a Variant,
+        parameters: &StepParameters,
+    ) -> Self {
+        let StepParameters { kinematic, pair_friction, .. } = *parameters;
+        let held = Held::by(&variant.numbers);
+        let points = if pair_friction { !layout::FRICTION_BITS } else { u32::MAX };
+        Self { shapes, needs, variant, held, kinematic, points }
+    }
+
+    /// The shape of a body, if it has one.
+    #[inline(always)]
+    pub(crate) fn shape_of(&self, body: &Body) -> Option<&'a Shape> {
+        usize::try_from(body.shape).ok().and_then(|shape| self.shapes.get(shape))
+    }
+
+    /// Whether constraint rows are computed in sixteen bits.
+    pub(crate) fn computes_short_rows(&self) -> bool {
+        self.variant.numbers.rows == Precision::Binary16
+    }
+
+    /// Checks collisions from index `first` on as [`validate`] does.
+    ///
+    /// # Errors
+    /// The error of the first collision that validation refuses.
+    pub(crate) fn refusal(
+        &self,
+        first: usize,
+        collisions: &[Collision],
+        ends: Ends<'_>,
+    ) -> Result<(), InputError> {
+        let end = |body: usize| {
+            // An index without a body was refused before.
+            let end = ends.get(u32::try_from(body).unwrap_or(u32::MAX));
+            (end.position, end.shape(self.shapes))
+        };
+        let mut collisions = (first..).zip(collisions);
+        collisions.try_for_each(|(index, collision)| check_whole(index, collision, end, self))
+    }
 }
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
@@ -275,10 +313,7 @@ pub(crate) mod tests {
 
     /// The context of checks on a bitstream of `variant`.
     pub(crate) fn scene_on(variant: &Variant) -> Scene<'_> {
-        let held = Held::by(&variant.numbers);
-        let (kinematic, pair_friction) = (false, false);
-        let (shapes, needs) = (&SHAPES, NEEDS);
-        Scene { shapes, needs, variant, held, kinematic, pair_friction }
+        Scene::new(&SHAPES, NEEDS, variant, &StepParameters::default())
     }
 
     fn body(shape: u32) -> Body {

@@ -9,16 +9,17 @@ use pgs_interface::profile::Variant;
 
 use super::range::{fits, used};
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
+use crate::record::body_table::Ends;
 use crate::scene::{Collision, Shape};
 
 /// The longest component of a lever arm, m. A component of a moment is two products of lever arm
 /// and unit normal: at most sqrt(2) times this, which stays below 65504 with the roundings added.
-pub(crate) const LONGEST_ARM: f32 = 43_000.0;
+const LONGEST_ARM: f32 = 43_000.0;
 /// 65504 less 2 % for the roundings on the way: the limit of inverse effective masses, of their
 /// reciprocals, and of the sum of the contact points.
-pub(crate) const LARGEST: f32 = 64_000.0;
+const LARGEST: f32 = 64_000.0;
 /// The relative error of a coordinate on its way: truncated once, or rounded twice.
-pub(crate) const LOSS: f32 = 1.0 / 1024.0;
+const LOSS: f32 = 1.0 / 1024.0;
 
 /// The input from which the constraint rows of a collision are computed.
 pub(crate) struct Rows<'a> {
@@ -27,6 +28,17 @@ pub(crate) struct Rows<'a> {
     /// Positions of bodies A and B, as they are streamed.
     pub(crate) positions: [[f32; 3]; 2],
     pub(crate) shapes: [&'a Shape; 2],
+}
+
+impl Scene<'_> {
+    /// Whether every row of a collision stays in the range of the bitstream's arithmetic.
+    pub(crate) fn rows_fit(&self, collision: &Collision, ends: Ends<'_>) -> bool {
+        let ends = [collision.body_a, collision.body_b].map(|body| ends.get(body));
+        let positions = ends.map(|end| end.position);
+        let shapes = ends.map(|end| end.shape(self.shapes));
+        let rows = Rows { index: 0, collision, positions, shapes };
+        collision.is_empty() || rows.fit(self.variant)
+    }
 }
 
 /// A number on the way to the rows: contact point, name, component, value, smallest, largest.

@@ -14,8 +14,7 @@ use zynq_pgs::{
 };
 
 /// The orders, and `None` for the board's own choice.
-const ORDERS: [Option<Order>; 4] =
-    [None, Some(Order::AsGiven), Some(Order::HazardFree), Some(Order::HazardFreeNearby)];
+const ORDERS: [Option<Order>; 3] = [None, Some(Order::AsGiven), Some(Order::HazardFree)];
 
 /// A pile that falls.
 struct Pile {
@@ -49,7 +48,7 @@ impl Pile {
     }
 
     fn open(&self, profile: &'static Profile, threads: usize) -> Accelerator {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let config = BoardConfig { profile, queue: Some(0), ..BoardConfig::default() };
         open_with(config, Some(threads), &self.shapes).1
     }
 

@@ -309,7 +309,7 @@ fn float_is_the_profile_of_the_thesis() {
     assert_eq!((friction.fill, friction.window), (328, 190));
     assert!(profile::NAIVE.world.is_none() && profile::HALF.world.is_none());
     assert!(profile::PROFILES.iter().all(|profile| profile.integration_fill == 264));
-    assert_eq!((float.queue, profile::NAIVE.queue, profile::HALF.queue), (Some(0), None, None));
+    assert_eq!((float.queue, profile::NAIVE.queue, profile::HALF.queue), (Some(64), None, None));
     assert_eq!(float.clock_khz, 275_000);
     assert_eq!(
         (float.default_variant().bytes_per_body(), float.default_variant().bytes_per_collision()),

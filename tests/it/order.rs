@@ -17,12 +17,12 @@ use zynq_pgs::validate::Excess;
 use zynq_pgs::{Body, Collision, Error, InputError, Shape, StepParameters, StepReport};
 
 fn with(hazards: Hazards) -> BoardConfig {
-    BoardConfig { hazards, ..BoardConfig::default() }
+    BoardConfig { hazards, queue: Some(0), ..BoardConfig::default() }
 }
 
 /// A board in which every collision reads the result of all collisions before it.
 fn sequential() -> BoardConfig {
-    BoardConfig { window_slots: Some(1), ..BoardConfig::default() }
+    BoardConfig { window_slots: Some(1), queue: Some(0), ..BoardConfig::default() }
 }
 
 fn verified(order: Order) -> StepParameters {
@@ -64,7 +64,7 @@ fn run_by_hand(mut scene: Scene, steps: usize) -> Vec<u32> {
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     for _ in 0..steps {
         scene.detect();
-        let order = Order::HazardFreeNearby;
+        let order = Order::HazardFree;
         let collisions = by_hand(order, scene.bodies(), scene.collisions(), scene.shapes(), DEPTH);
         let (bodies, _) = scene.parts_mut();
         let report = accelerator.step(bodies, &collisions, &ordered(Order::AsGiven));
@@ -79,7 +79,7 @@ fn a_pile_takes_the_same_way_whether_the_pipeline_waits_or_not() {
     const STEPS: usize = 120;
     let scene = || pile("8x8x8", 0.5);
     let (waiting, reports) =
-        run(with(Hazards::Interlocked), scene(), STEPS, &verified(Order::HazardFreeNearby));
+        run(with(Hazards::Interlocked), scene(), STEPS, &verified(Order::HazardFree));
     // The default on hardware that does not wait.
     let (unchecked, loose) =
         run(with(Hazards::Unchecked), scene(), STEPS, &StepParameters::default());
@@ -101,17 +101,14 @@ fn a_pile_takes_the_same_way_whether_the_pipeline_waits_or_not() {
     for (report, loose) in reports.iter().zip(&loose) {
         assert_eq!((report.hazards, report.cycles.stalls), (0, 0));
         assert_eq!((loose.hazards, loose.cycles.stalls), (0, 0));
-        assert_eq!([report.order, loose.order], [Order::HazardFreeNearby; 2]);
+        assert_eq!([report.order, loose.order], [Order::HazardFree; 2]);
         // The formula for two cycles an entry, empty ones included: 513 bodies are 256.5 slots of
         // four beats in and 513 out; the pipelines fill in 374 and 314 cycles,
         // the integration in 264.
         let passes = if report.collisions == 0 { 0 } else { 4 * (374 + 314) };
         let entries = 8 * 2 * (report.collisions + report.empty);
         assert_eq!(report.cycles.work, 257 + entries + passes + 513 + 264);
-        let proved = report.verified.expect("it was to be verified");
-        assert_eq!((proved.hazards, proved.lost_updates), (0, 0));
-        assert_eq!(proved.empty as u64, report.empty);
-        assert_eq!(loose.verified, None);
+        assert!(report.verified && !loose.verified);
     }
     // As given, hardware that does not wait gives other bits.
     let (stale, _) = run(with(Hazards::Unchecked), scene(), STEPS, &ordered(Order::AsGiven));
@@ -132,10 +129,10 @@ fn as_given_is_solved_one_collision_after_the_other_where_hazards_are_waited_for
 /// Every body comes back at its index, and the board receives the requested order.
 #[test]
 fn every_order_is_sent_on_every_design_and_none_moves_a_body_elsewhere() {
-    let orders = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];
+    let orders = [Order::AsGiven, Order::Interleaved, Order::HazardFree];
     let profiles: [&'static Profile; 3] = [&NAIVE, &FLOAT, &HALF];
     for profile in profiles {
-        let config = BoardConfig { profile, ..BoardConfig::default() };
+        let config = BoardConfig { profile, queue: Some(0), ..BoardConfig::default() };
         for order in orders {
             let (board, mut accelerator) = open(config);
             let mut scene = pile("4x3x4", 0.0);
@@ -180,7 +177,7 @@ fn what_cannot_be_proved_is_not_sent() {
     assert_eq!(bits(bodies), before.0);
     assert_eq!(board.counts(), before.1, "not a register was touched");
     let report = accelerator.step(bodies, collisions, &verified(Order::HazardFree));
-    assert_eq!(report.expect("it has none").verified.expect("verified").hazards, 0);
+    assert!(report.expect("it has none").verified);
 }
 
 /// A hub that touches all other bodies needs a window for each of its collisions.
@@ -253,7 +250,7 @@ fn the_full_step_gives_the_same_bits_and_keeps_its_energy() {
         );
         (bits(&bodies), report, energy)
     };
-    for order in [Order::HazardFree, Order::HazardFreeNearby] {
+    for order in [Order::HazardFree, Order::HazardFree] {
         let collisions = by_hand(order, &start.bodies, &start.collisions, &start.shapes, DEPTH);
         let (expected, _, energy) = step(sequential(), &collisions, Order::AsGiven);
         for hazards in [Hazards::Unchecked, Hazards::Interlocked] {

@@ -121,8 +121,9 @@ fn the_impulses_take_the_place_of_the_computed_ones_in_the_first_pass_of_each_ki
 #[test]
 fn impulses_follow_their_collisions_through_every_order() {
     let (bodies, collisions) = world();
-    for order in [Order::HazardFreeNearby, Order::HazardFree] {
-        let config = BoardConfig { inertia: Inertia::World, ..BoardConfig::default() };
+    for order in [Order::Interleaved, Order::HazardFree] {
+        let config =
+            BoardConfig { inertia: Inertia::World, queue: Some(0), ..BoardConfig::default() };
         let (_board, mut accelerator) = open_with(config, None, &shapes());
         let parameters = warm(order);
         let mut found = bodies.clone();

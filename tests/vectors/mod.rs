@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use pgs_support::chunks::Chunks;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
 
 /// One step of Bullet.
@@ -26,7 +25,7 @@ fn words(folder: &Path, name: &str) -> Vec<u32> {
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"), "{}", path.display());
     let header = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let (words, rest) = bytes[10 + header..].split_arrays::<4>();
+    let (words, rest) = bytes[10 + header..].as_chunks::<4>();
     assert!(rest.is_empty(), "{}", path.display());
     words.iter().map(|word| u32::from_le_bytes(*word)).collect()
 }
@@ -34,7 +33,7 @@ fn words(folder: &Path, name: &str) -> Vec<u32> {
 /// The rows of an array of f32.
 fn rows<const N: usize>(folder: &Path, name: &str) -> Vec<[f32; N]> {
     let words = words(folder, name);
-    let (rows, rest) = words.split_arrays::<N>();
+    let (rows, rest) = words.as_chunks::<N>();
     assert!(rest.is_empty(), "{name}");
     rows.iter().map(|row| row.map(f32::from_bits)).collect()
 }
@@ -72,7 +71,7 @@ pub(crate) fn load(folder: &Path) -> Step {
     let pairs = words(folder, "contact_bodies.npy");
     let collisions = counts
         .iter()
-        .zip(pairs.split_arrays::<2>().0)
+        .zip(pairs.as_chunks::<2>().0)
         .zip(rows::<3>(folder, "contact_normal.npy"))
         .zip(rows::<16>(folder, "contact_points.npy"))
         .map(|(((count, pair), normal), points)| Collision {

@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Counts instructions by callgrind: what noise hides from a benchmark, and no other test sees.
 #
-# - Packing and looking at records once it is known where these lie: a loop that has lost its registers to
-#   another packs the same beats, and what is looked at twice is as right or wrong.
+# - Packing and its checks, once it is known where the records lie.
 # - A step on the emulated board: collisions that are taken one after the other instead of many at a time give
 #   the same bits.
 #
@@ -10,8 +9,7 @@
 #   tools/scripts/instructions.sh --input FOLDER     prints them alone, of a step in a folder of arrays
 #
 # Of each: profile, thing (of those that tools/bench/benches/pack.rs describes, or a step), instructions an
-# entry or a collision, limit. The pile's collisions have four contact points and its order is near to the one
-# that they lie in; loops of other collisions and of orders that go far are counted of a step in a folder alone.
+# entry or a collision, limit. The packing of an entry has its share of the bodies.
 #
 # Exit code: 0 done, 1 something takes more than its limit or cannot be counted, 77 skipped: not on this
 # machine.
@@ -23,7 +21,7 @@ case "$*" in
 	'--input '?*) scene=(--input "$(realpath -e "$2")") ;;
 	*) fail "expected nothing or --input FOLDER, found: $*" ;;
 esac
-# Elsewhere the loops are compiled for other vectors than those whose instructions the limits count.
+# Elsewhere the conversions and the emulated board use other instructions than those that the limits count.
 [[ $(rustc -vV) == *'host: x86_64'* ]] || skip "the limits are those of x86-64"
 for feature in avx2 f16c; do
 	grep -q -w $feature /proc/cpuinfo 2>/dev/null || skip "the limits are those of $feature, which the processor has not"
@@ -43,7 +41,7 @@ pack=$(built pack)
 speed=$(built speed)
 
 # All of packing is in the first of these functions, all that the board does in the last.
-packers=('zynq_pgs::beat::pack::collisions::CollisionPacker::write*' 'zynq_pgs::beat::pack::bodies::BodyPacker::write')
+packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::bodies::BodyPacker::write')
 board='bitstream_model::board::Board::advance'
 log=$(mktemp)
 litter+=("$log")
@@ -105,17 +103,15 @@ while read -r profile thing limit; do
 	packings=$(some 'stretches of NUMBER runs')
 	entries=$(some ' NUMBER collisions;')
 	added=$(said ' NUMBER empty entries;')
-	case $thing in *in-order) entries=$((entries + added)) ;; esac
+	case $thing in in-order | warm) entries=$((entries + added)) ;; esac
 	hold "$what" $(((counted[1] - counted[0]) * 10 / packings / entries)) "an entry" "$limit"
 done <<'LIMITS'
-float as-given 60
-float in-order 84
-float checked-as-given 127
-float checked-in-order 163
-half as-given 43
-half in-order 57
-half checked-as-given 145
-half checked-in-order 173
+float as-given 275
+float in-order 268
+float warm 340
+half as-given 720
+half in-order 680
+half warm 760
 LIMITS
 
 # A step on the emulated board, on one thread; the vectors are those that valgrind knows, AVX2.
@@ -130,6 +126,6 @@ float 3840
 half 5690
 LIMITS
 
-[ $held = 10 ] || fail "$held of 10 were counted"
+[ $held = 8 ] || fail "$held of 8 were counted"
 [ $good = yes ] || fail "something does not take the instructions it did: if the commit before it does, with" \
 	"$(rustc --version), look at the loops (and at the names ${packers[*]} and $board); else change the limits"

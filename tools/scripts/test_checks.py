@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of words.py, circles.py and lines.py on planted sources.
+"""Tests of words.py, circles.py, lines.py and duplicates.py on planted sources.
 
 usage: test_checks.py
 """
@@ -11,6 +11,7 @@ import unittest
 from pathlib import Path
 
 import circles
+import duplicates
 import lines
 import words
 
@@ -138,6 +139,26 @@ class Lines(Planted):
         code, output = self.check(3, "tools/d.rs")
         self.assertEqual(code, 1)
         self.assertIn("tools/d.rs is in no part", output)
+
+
+class Duplicates(Planted):
+    def check(self, *files: str) -> tuple[int, str]:
+        self.plant(dict(zip(("a.rs", "b.rs"), files)))
+        return self.run_check(duplicates)
+
+    def test_six_equal_lines_need_a_reason_and_five_do_not(self):
+        six = [f"    act({k}); // {{}}" for k in range(6)]
+        for count, code in ((5, 0), (6, 1)):
+            body = "\n\n    // comment\n".join(six[:count])
+            found, output = self.check(f"fn a() {{\n{body}\n}}", f"fn b() {{\n{body}\n}}")
+            self.assertEqual(found, code, output)
+            self.assertEqual("a.rs and b.rs share a run" in output, bool(code), output)
+
+    def test_tests_and_imports_do_not_count(self):
+        uses = "\n".join(f"use a::b{k};" for k in range(9))
+        tests = "#[cfg(test)]\nmod tests {\n" + "\n".join(f"fn f{k}() {{}}" for k in range(9)) + "\n}"
+        code, output = self.check(uses + "\n" + tests, uses + "\n" + tests)
+        self.assertEqual(code, 0, output)
 
 
 class Words(Planted):

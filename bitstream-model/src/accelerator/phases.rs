@@ -5,7 +5,6 @@ use std::ops::Range;
 use super::arithmetic::inertia::{self, Isotropic, World};
 use super::arithmetic::number::{Format, Half, Single, SingleFlushed};
 use super::hazards::Entry;
-use super::queue::Waiting;
 use super::records::array::{Array, Records};
 use super::records::decode::{self, Collision};
 use super::records::results::Results;
@@ -345,15 +344,14 @@ impl Accelerator {
             self.counters.stalls += issued.idle * interval;
             self.counters.hazards += u64::from(issued.hazard);
             cycles += (issued.idle + 1) * interval;
-            let Waiting { number: which, place, .. } = issued.collision;
-            let (index, collision) = (which as usize, self.queued[place as usize]);
+            let (index, collision) = (issued.number as usize, self.queued[issued.place as usize]);
             if let Some(entry) = self.entry_of(index, &collision)? {
                 let velocities = self.solved::<R, U, I>(number, index, &collision, &entry);
                 self.write_back(&entry, velocities);
             }
             if sends {
                 self.send_impulses(number, index, &collision, outputs);
-                self.unsent.push(which);
+                self.unsent.push(issued.number);
                 if closes {
                     let numbers = std::mem::take(&mut self.unsent);
                     self.send_beat(decode::numbers(&numbers), outputs);

@@ -2,7 +2,7 @@
 //!
 //! It decides in slots and knows neither clocks nor beats (bitstream-model/README.md §8). The
 //! reference asks it beat by beat, [`fast`](crate::fast) once a step for all passes. It keeps who
-//! waits; the records stay where its owner has them, at the [`place`](Waiting::place) of each.
+//! waits; the records stay where its owner has them, at the [`place`](Issued::place) of each.
 
 use std::collections::VecDeque;
 
@@ -11,13 +11,10 @@ use crate::cast::register;
 use pgs_interface::control::QUEUE_PATIENCE;
 
 /// A collision in the queue.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Waiting {
-    /// Its number in the stream.
-    pub(crate) number: u32,
-    /// Its place among the records of the queue, below the depth. No other collision has it at the
-    /// same time.
-    pub(crate) place: u32,
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    number: u32,
+    place: u32,
     /// Its moving bodies; the number of all bodies stands for one that does not move.
     bodies: [u32; 2],
     /// The first slot in which it could issue.
@@ -25,13 +22,31 @@ pub(crate) struct Waiting {
 }
 
 /// A collision that issues.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Issued {
-    pub(crate) collision: Waiting,
+    /// Its number in the stream.
+    pub(crate) number: u32,
+    /// Its place among the records of the queue, below the depth. No other collision had it at the
+    /// same time.
+    pub(crate) place: u32,
     /// Slots that idled before.
     pub(crate) idle: u64,
     /// Whether it met a hazard while it waited.
     pub(crate) hazard: bool,
+}
+
+/// A collision that leaves the queue, and the slot from which it was free of hazards.
+struct Leaving {
+    collision: Waiting,
+    is_oldest: bool,
+    free: u64,
+}
+
+/// The slot from which a collision is free of hazards, by the slots from which bodies are.
+#[inline(always)]
+fn free_from(free: &[u64], collision: &Waiting) -> u64 {
+    let [a, b] = collision.bodies.map(|body| free[body as usize]);
+    a.max(b)
 }
 
 /// The queue of a board.
@@ -42,10 +57,15 @@ pub(crate) struct Queue {
     window: u64,
     /// The next slot that decides, counted over all passes of a step.
     slot: u64,
-    /// The first slot in which the oldest collision was the oldest.
-    oldest_since: u64,
-    /// In the order of the stream.
-    waiting: VecDeque<Waiting>,
+    /// The slot from which on the bodies of the oldest collision are left to it.
+    patient_until: u64,
+    /// Collisions that met a hazard, and behind them the ones that nobody has looked at, each in the
+    /// order of the stream: most slots look at one collision.
+    blocked: Vec<Waiting>,
+    fresh: VecDeque<Waiting>,
+    /// A slot before which each of the blocked ones cannot issue, and one for all of them.
+    until: Vec<u64>,
+    blocked_until: u64,
     /// The slot from which each body is free.
     free: Vec<u64>,
     /// Collisions that have entered in this pass.
@@ -69,17 +89,20 @@ impl Queue {
 
     /// A pass begins: the queue is empty, and everything is written back.
     pub(crate) fn start_pass(&mut self) {
-        self.waiting.clear();
+        self.blocked.clear();
+        self.until.clear();
+        self.fresh.clear();
         self.slot += self.window;
-        (self.oldest_since, self.entered, self.left) = (self.slot, 0, 0);
+        self.patient_until = self.slot + self.patience();
+        (self.entered, self.left) = (0, 0);
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.waiting.len()
+        self.blocked.len() + self.fresh.len()
     }
 
     pub(crate) fn is_full(&self) -> bool {
-        self.waiting.len() == self.depth
+        self.len() == self.depth
     }
 
     /// Whether the next collision that enters takes a slot to do so.
@@ -94,6 +117,7 @@ impl Queue {
 
     /// The next collision of the stream enters a queue that is not full; padding has no entry.
     /// Returns its place.
+    #[inline(always)]
     pub(crate) fn enter(&mut self, entry: Option<Entry>) -> u32 {
         debug_assert!(!self.is_full(), "a collision enters when another has left");
         let nobody = register(self.free.len() - 1);
@@ -103,62 +127,118 @@ impl Queue {
         let place = if self.fills() { self.entered } else { self.left };
         let number = self.entered;
         self.entered += 1;
-        self.waiting.push_back(Waiting { number, place, bodies, since: self.slot });
+        self.fresh.push_back(Waiting { number, place, bodies, since: self.slot });
         place
-    }
-
-    /// The slot from which a collision is free of hazards.
-    #[inline(always)]
-    fn free_from(&self, collision: &Waiting) -> u64 {
-        let [a, b] = collision.bodies.map(|body| self.free[body as usize]);
-        a.max(b)
     }
 
     /// The next collision to issue leaves. The queue is full, or the stream has ended. `None`: it
     /// is empty.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn issue(&mut self) -> Option<Issued> {
-        let oldest = *self.waiting.front()?;
-        let (mut at, mut slot) = (0, self.free_from(&oldest).max(self.slot));
-        if slot > self.slot {
-            (at, slot) = self.younger(&oldest, slot);
-        }
-        let collision = self.waiting.remove(at)?;
-        // In a window of one slot no collision finds its body taken.
-        let hazard = self.window > 1 && self.free_from(&collision) > collision.since;
-        let idle = slot - self.slot;
+        let before = self.slot;
+        let Leaving { collision, is_oldest, free } = self.leaves()?;
         let last = self.free.len() - 1;
-        for body in collision.bodies.map(|body| body as usize) {
-            if body < last {
-                self.free[body] = slot + self.window;
-            }
+        for body in collision.bodies {
+            self.free[body as usize] = self.slot + self.window;
         }
-        (self.slot, self.left) = (slot + 1, collision.place);
-        if at == 0 {
-            self.oldest_since = self.slot;
+        self.free[last] = 0;
+        let Waiting { number, place, since, .. } = collision;
+        let idle = self.slot - before;
+        self.slot += 1;
+        self.left = place;
+        if is_oldest {
+            self.patient_until = self.slot + self.patience();
         }
-        Some(Issued { collision, idle, hazard })
+        // In a window of one slot no collision finds its body taken.
+        let hazard = free > since && self.window > 1;
+        Some(Issued { number, place, idle, hazard })
     }
 
-    /// The collision that issues first and its slot, where the oldest one has to wait until `slot`.
-    fn younger(&self, oldest: &Waiting, slot: u64) -> (usize, u64) {
-        let mut first = (0, slot);
+    /// Slots for which others may pass the oldest collision.
+    fn patience(&self) -> u64 {
+        u64::from(QUEUE_PATIENCE) * self.window
+    }
+
+    /// Takes the oldest collision that is free, idling until one is.
+    #[inline(always)]
+    fn leaves(&mut self) -> Option<Leaving> {
+        loop {
+            if self.slot >= self.patient_until {
+                return self.leaves_by_patience();
+            }
+            if self.slot >= self.blocked_until
+                && let Some(at) = self.unblocked()
+            {
+                return Some(self.take_blocked(at));
+            }
+            while let Some(collision) = self.fresh.pop_front() {
+                let free = free_from(&self.free, &collision);
+                if free <= self.slot {
+                    let is_oldest = self.blocked.is_empty();
+                    return Some(Leaving { collision, is_oldest, free });
+                }
+                self.block(collision, free);
+            }
+            if self.blocked.is_empty() {
+                return None;
+            }
+            self.slot = self.blocked_until;
+        }
+    }
+
+    #[inline(never)]
+    fn block(&mut self, collision: Waiting, until: u64) {
+        let others = if self.blocked.is_empty() { until } else { self.blocked_until };
+        self.blocked_until = others.min(until);
+        self.blocked.push(collision);
+        self.until.push(until);
+    }
+
+    #[inline(never)]
+    fn take_blocked(&mut self, at: usize) -> Leaving {
+        self.until.remove(at);
+        let collision = self.blocked.remove(at);
+        Leaving { collision, is_oldest: at == 0, free: free_from(&self.free, &collision) }
+    }
+
+    /// The oldest blocked collision that is free now.
+    #[inline(never)]
+    fn unblocked(&mut self) -> Option<usize> {
+        let mut soonest = u64::MAX;
+        for (at, until) in self.until.iter_mut().enumerate() {
+            if *until <= self.slot {
+                // Another one may have taken its bodies meanwhile.
+                *until = free_from(&self.free, &self.blocked[at]);
+                if *until <= self.slot {
+                    return Some(at);
+                }
+            }
+            soonest = soonest.min(*until);
+        }
+        self.blocked_until = soonest;
+        None
+    }
+
+    /// The same when the oldest one has waited for so long that its bodies are left to it.
+    #[cold]
+    fn leaves_by_patience(&mut self) -> Option<Leaving> {
+        while let Some(collision) = self.fresh.pop_front() {
+            self.block(collision, self.slot);
+        }
+        let oldest = *self.blocked.first()?;
         let nobody = register(self.free.len() - 1);
         let shares = |other: &Waiting| {
             oldest.bodies.iter().any(|body| *body != nobody && other.bodies.contains(body))
         };
-        // From this slot on the bodies of the oldest one are left to it.
-        let patient_until = self.oldest_since + u64::from(QUEUE_PATIENCE) * self.window;
-        for (at, collision) in self.waiting.iter().enumerate().skip(1) {
-            let free = self.free_from(collision).max(self.slot);
-            if free < first.1 && (free < patient_until || !shares(collision)) {
-                first = (at, free);
-                if free == self.slot {
-                    break;
-                }
+        let (mut first, mut soonest) = (0, free_from(&self.free, &oldest).max(self.slot));
+        for (at, collision) in self.blocked.iter().enumerate().skip(1) {
+            let free = free_from(&self.free, collision).max(self.slot);
+            if free < soonest && !shares(collision) {
+                (first, soonest) = (at, free);
             }
         }
-        first
+        self.slot = soonest;
+        Some(self.take_blocked(first))
     }
 }
 
@@ -186,10 +266,10 @@ mod tests {
                 places.push(place);
                 continue;
             }
-            let Some(Issued { collision, idle, hazard }) = queue.issue() else { break };
-            places.retain(|place| *place != collision.place);
-            issues.push((slot + idle, collision.number));
-            hazards.extend(hazard.then_some(collision.number));
+            let Some(Issued { number, place, idle, hazard }) = queue.issue() else { break };
+            places.retain(|other| *other != place);
+            issues.push((slot + idle, number));
+            hazards.extend(hazard.then_some(number));
             slot += idle + 1;
         }
         hazards.sort_unstable();
@@ -280,5 +360,59 @@ mod tests {
         let (issues, hazards) = pass(&mut queue, &[[0, 1], [2, 3]]);
         assert_eq!(issues, [(0, 0), (1, 1)]);
         assert!(hazards.is_empty());
+    }
+
+    /// The same by looking at every collision in every slot, as the specification has it.
+    fn by_search(depth: usize, window: u64, pairs: &[[u32; 2]]) -> (Vec<(u64, u32)>, Vec<u32>) {
+        let moving = |number: u32| {
+            pairs[number as usize].into_iter().filter(|body| *body != GROUND).collect::<Vec<_>>()
+        };
+        let mut last: Vec<Option<u64>> = vec![None; 32];
+        let mut coming = 0..register(pairs.len());
+        let mut waiting: Vec<u32> = coming.by_ref().take(depth).collect();
+        let (mut slot, mut oldest_waits, mut issues) = (0, 0, Vec::new());
+        let mut hazards = std::collections::BTreeSet::new();
+        while let Some(oldest) = waiting.first().copied() {
+            let taken = |number: u32| {
+                moving(number)
+                    .iter()
+                    .any(|body| last[*body as usize].is_some_and(|issued| slot - issued < window))
+            };
+            hazards.extend(waiting.iter().copied().filter(|number| taken(*number)));
+            let shares = |number: u32| moving(number).iter().any(|b| moving(oldest).contains(b));
+            let kept =
+                |number: u32| oldest_waits >= 4 * window && number != oldest && shares(number);
+            let next = waiting.iter().position(|number| !taken(*number) && !kept(*number));
+            if let Some(at) = next {
+                let number = waiting.remove(at);
+                moving(number).iter().for_each(|body| last[*body as usize] = Some(slot));
+                issues.push((slot, number));
+                waiting.extend(coming.next());
+            }
+            oldest_waits = if next == Some(0) { 0 } else { oldest_waits + 1 };
+            slot += 1;
+        }
+        (issues, hazards.into_iter().collect())
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn every_slot_decides_as_the_specification_does(
+            (depth, window) in (1..12_u32, 1..9_u64),
+            hubs in 1..6_u32,
+            pairs in proptest::collection::vec((0..32_u32, 0..32_u32, 0..4_u8), 0..120),
+        ) {
+            // One side is often a hub, so that collisions wait for long.
+            let pairs: Vec<[u32; 2]> = pairs
+                .into_iter()
+                .map(|(a, b, how)| if how > 0 { [a % hubs, b] } else { [a, b] })
+                .map(|[a, b]| if a == b { [GROUND; 2] } else { [a, b] })
+                .collect();
+            let mut queue = queue(depth, window);
+            for _ in 0..2 {
+                let expected = by_search(depth as usize, window, &pairs);
+                proptest::prop_assert_eq!(pass(&mut queue, &pairs), expected);
+            }
+        }
     }
 }

@@ -72,9 +72,8 @@ impl Order {
         self.slots.idle += issued.idle;
         self.slots.hazards += u64::from(issued.hazard);
         self.slots.draining = self.queue.slot() - self.last_entry;
-        let number = issued.collision.number;
-        self.numbers.push(number);
-        Some(number)
+        self.numbers.push(issued.number);
+        Some(issued.number)
     }
 
     /// The slots of each pass; `None` in the order of the stream.

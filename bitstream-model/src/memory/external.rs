@@ -38,6 +38,49 @@ pub trait DeviceMemory: fmt::Debug + Send {
     fn write_word(&mut self, address: u64, value: u32) -> io::Result<()>;
 }
 
+/// Memory outside the board that is accessed byte by byte, as a file is.
+pub trait ByteMemory: fmt::Debug + Send {
+    /// Reads bytes.
+    ///
+    /// # Errors
+    /// As [`DeviceMemory::read_beats`].
+    fn read(&self, address: u64, to: &mut [u8]) -> io::Result<()>;
+
+    /// Writes bytes.
+    ///
+    /// # Errors
+    /// As [`DeviceMemory::read_beats`].
+    fn write(&self, address: u64, from: &[u8]) -> io::Result<()>;
+
+    /// Writes a word, its uppermost byte last: it holds the flags that complete a descriptor.
+    ///
+    /// # Errors
+    /// As [`DeviceMemory::read_beats`].
+    fn write_upwards(&self, address: u64, value: u32) -> io::Result<()> {
+        let bytes = value.to_le_bytes();
+        self.write(address, &bytes[..3])?;
+        self.write(address + 3, &bytes[3..])
+    }
+}
+
+impl<M: ByteMemory> DeviceMemory for M {
+    fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
+        self.read(address, bytemuck::cast_slice_mut(to))
+    }
+
+    fn write_beats(&mut self, address: u64, from: &[Beat]) -> io::Result<()> {
+        self.write(address, bytemuck::cast_slice(from))
+    }
+
+    fn read_words(&mut self, address: u64, to: &mut [u32]) -> io::Result<()> {
+        self.read(address, bytemuck::cast_slice_mut(to))
+    }
+
+    fn write_word(&mut self, address: u64, value: u32) -> io::Result<()> {
+        self.write_upwards(address, value)
+    }
+}
+
 /// Memory outside the board, and the ranges that the device may touch.
 #[derive(Debug)]
 pub(crate) struct ExternalMemory {

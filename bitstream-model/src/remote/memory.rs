@@ -16,9 +16,8 @@ use nix::sys::memfd::{MFdFlags, memfd_create};
 use thiserror::Error;
 
 use crate::handle::EmulatedBoard;
-use crate::memory::external::DeviceMemory;
+use crate::memory::external::ByteMemory;
 use pgs_interface::message::MEMORY_UNIT;
-use pgs_interface::record::Beat;
 
 /// The seals of a board's memory: its length never changes, and no seal is added.
 pub const SEALS: SealFlag =
@@ -192,7 +191,9 @@ impl BoardMemory {
             None => Err(io::Error::new(io::ErrorKind::NotFound, "no driver has memory")),
         }
     }
+}
 
+impl ByteMemory for BoardMemory {
     fn read(&self, address: u64, to: &mut [u8]) -> io::Result<()> {
         self.with(address, to.len(), |file, at| file.read_exact_at(to, at))
     }
@@ -202,32 +203,14 @@ impl BoardMemory {
     }
 }
 
-impl DeviceMemory for BoardMemory {
-    fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
-        self.read(address, bytemuck::cast_slice_mut(to))
-    }
-
-    fn write_beats(&mut self, address: u64, from: &[Beat]) -> io::Result<()> {
-        self.write(address, bytemuck::cast_slice(from))
-    }
-
-    fn read_words(&mut self, address: u64, to: &mut [u32]) -> io::Result<()> {
-        self.read(address, bytemuck::cast_slice_mut(to))
-    }
-
-    /// Writes the uppermost byte last: it holds the flags that show that a descriptor is complete.
-    fn write_word(&mut self, address: u64, value: u32) -> io::Result<()> {
-        let bytes = value.to_le_bytes();
-        self.write(address, &bytes[..3])?;
-        self.write(address + 3, &bytes[3..])
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
+    use pgs_interface::record::Beat;
+
     use super::*;
+    use crate::memory::external::DeviceMemory as _;
 
     #[test]
     fn memory_is_reserved_to_its_last_byte_and_keeps_its_length_for_good() {

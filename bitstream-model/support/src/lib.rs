@@ -26,7 +26,6 @@ compile_error!(
      virtual machine."
 );
 
-pub mod chunks;
 pub mod float_env;
 pub mod lanes;
 mod process;
@@ -45,11 +44,6 @@ use float_env::standard;
 pub use process::Process;
 #[cfg(any(test, feature = "forked-child"))]
 pub use process::in_forked_child;
-
-/// Says that the path which calls this is seldom taken, as `std::hint::cold_path` does from Rust 1.95 on.
-#[cold]
-#[inline]
-pub const fn cold_path() {}
 
 /// The work of every thread that comes in time; the argument is the thread's number, the caller's 0.
 type Work = dyn Fn(usize) + Sync;

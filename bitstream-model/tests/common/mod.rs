@@ -33,6 +33,11 @@ pub(crate) const fn microseconds(count: u64) -> Duration {
     Duration::from_micros(count)
 }
 
+/// A board without an issue queue, on which collisions enter in the order of the stream.
+pub(crate) fn without_queue() -> BoardConfig {
+    BoardConfig { queue: Some(0), ..BoardConfig::default() }
+}
+
 /// A board with both of its handles.
 #[derive(Debug)]
 pub(crate) struct Host {

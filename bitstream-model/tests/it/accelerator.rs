@@ -12,20 +12,19 @@ use crate::common::scene::{
     AT_REST, Body, Collision, Lane, STATIC, Step, bits, ground_contact, one_cube, result_beats,
 };
 use crate::common::sg::{Failure, Flight, LONG, Machine, Outcome};
-use crate::common::{CORES, microseconds, numbered};
+use crate::common::{CORES, microseconds, numbered, without_queue};
 
 const UNLIMITED: Bandwidth = Bandwidth::Unlimited;
 
 fn machine() -> Machine {
-    Machine::new(BoardConfig { bandwidth: UNLIMITED, ..BoardConfig::default() })
+    Machine::new(BoardConfig { bandwidth: UNLIMITED, ..without_queue() })
 }
 
 #[test]
 fn one_cube_on_the_ground_ends_in_bullets_bits() {
     for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
         for profile in [&FLOAT, &NAIVE] {
-            let mut machine =
-                Machine::new(BoardConfig { hazards, profile, ..BoardConfig::default() });
+            let mut machine = Machine::new(BoardConfig { hazards, profile, ..without_queue() });
             let outcome = machine.step(&one_cube()).expect("the step completes");
             let cube = bits(&outcome.bodies[1]);
             assert_eq!(cube[0], [0x3E7F_E9BD, 0x3F7E_B865, 0xBF00_04AA, 0]);
@@ -244,7 +243,7 @@ fn a_beat_with_invalid_bytes_is_refused() {
 
 #[test]
 fn the_first_error_stays_and_a_start_does_not_clear_it() {
-    let mut machine = Machine::new(BoardConfig { strict: false, ..BoardConfig::default() });
+    let mut machine = Machine::new(BoardConfig { strict: false, ..without_queue() });
     let scene = spoilt(|collision| collision.count = 9);
     let failure = machine.step(&scene).expect_err("it is refused");
     assert_eq!(failure, Failure::Accelerator(ErrorCode::ContactCount as u32, 0, 2));
@@ -271,7 +270,7 @@ fn padding_changes_nothing_wherever_it_stands() {
             let mut padded = scene.clone();
             padded.collisions.insert(at, padding);
             padded.collisions.insert(at, padding);
-            let config = BoardConfig { hazards, ..BoardConfig::default() };
+            let config = BoardConfig { hazards, ..without_queue() };
             let outcome = Machine::new(config).step(&padded).expect("the step completes");
             assert_eq!(bits(&outcome.bodies[1]), bits(&expected.bodies[1]));
             assert_eq!(outcome.impulse_sum, expected.impulse_sum);
@@ -356,7 +355,7 @@ fn a_host_that_waits_for_mm2s_idle_before_it_arms_s2mm_waits_for_ever() {
 
 #[test]
 fn arguments_and_shapes_are_not_taken_while_a_step_runs() {
-    let mut machine = Machine::new(BoardConfig { strict: false, ..BoardConfig::default() });
+    let mut machine = Machine::new(BoardConfig { strict: false, ..without_queue() });
     let host = &machine.host;
     Step::falling(4).write_arguments(host);
     machine.start();
@@ -440,7 +439,7 @@ fn cycles_are_the_formula_and_stalls_and_waits_exactly() {
             Step { iterations: [0, 2], ..Step::on_ground(200, 401) },
             Step { iterations: [0, 0], ..Step::on_ground(2, 5) },
         ] {
-            let mut machine = Machine::new(BoardConfig { bandwidth, ..BoardConfig::default() });
+            let mut machine = Machine::new(BoardConfig { bandwidth, ..without_queue() });
             // Without passes the collisions are not streamed.
             let outcome = machine.step(&scene).expect("the step completes");
             assert_accounted(&outcome, &scene);
@@ -468,7 +467,7 @@ fn a_chain_on_one_body_stalls_for_the_window_less_the_interval_each() {
     assert_eq!(outcome.stalls, 2 * (324 - 2) + 2 * (190 - 2));
     assert_eq!(outcome.hazards, 4);
     assert_accounted(&outcome, &scene);
-    let config = BoardConfig { window_slots: Some(10), ..BoardConfig::default() };
+    let config = BoardConfig { window_slots: Some(10), ..without_queue() };
     let mut machine = Machine::new(config);
     let outcome = machine.step(&scene).expect("the step completes");
     assert_eq!(outcome.stalls, 4 * (20 - 2));
@@ -478,11 +477,8 @@ fn a_chain_on_one_body_stalls_for_the_window_less_the_interval_each() {
 #[test]
 fn a_pass_ends_no_sooner_than_its_last_write_back() {
     // 2,000 slots are 4,000 cycles, more than either fill.
-    let config = BoardConfig {
-        window_slots: Some(2_000),
-        hazards: Hazards::Unchecked,
-        ..BoardConfig::default()
-    };
+    let config =
+        BoardConfig { window_slots: Some(2_000), hazards: Hazards::Unchecked, ..without_queue() };
     let scene = Step { iterations: [1, 1], ..Step::on_ground(1, 3) };
     let mut machine = Machine::new(config);
     let outcome = machine.step(&scene).expect("the step completes");
@@ -500,7 +496,7 @@ fn a_pass_ends_no_sooner_than_its_last_write_back() {
 
 #[test]
 fn stalls_of_more_than_32_bits_leave_the_formula_right() {
-    let config = BoardConfig { window_slots: Some(32_767), ..BoardConfig::default() };
+    let config = BoardConfig { window_slots: Some(32_767), ..without_queue() };
     let scene = Step { iterations: [1, 0], ..Step::on_ground(1, 66_000) };
     let outcome = Machine::new(config).step(&scene).expect("the step completes");
     assert_eq!(outcome.stalls, 65_999 * (65_534 - 2));
@@ -512,7 +508,7 @@ fn stalls_of_more_than_32_bits_leave_the_formula_right() {
 #[test]
 fn a_window_of_one_slot_never_stalls() {
     for hazards in [Hazards::Interlocked, Hazards::Unchecked] {
-        let config = BoardConfig { window_slots: Some(1), hazards, ..BoardConfig::default() };
+        let config = BoardConfig { window_slots: Some(1), hazards, ..without_queue() };
         let outcome = Machine::new(config).step(&Step::on_ground(1, 3)).expect("completes");
         assert_eq!((outcome.stalls, outcome.hazards), (0, 0));
     }
@@ -541,7 +537,7 @@ fn interlocked_both_impulses_count() {
 
 #[test]
 fn unchecked_the_first_impulse_is_overwritten() {
-    let config = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
+    let config = BoardConfig { hazards: Hazards::Unchecked, ..without_queue() };
     let outcome = Machine::new(config).step(&corner()).expect("the step completes");
     // The wall's write-back, made from the velocity before the floor, comes last.
     let [x, y, z] = outcome.bodies[1].linear.map(f32::to_bits);
@@ -560,7 +556,7 @@ fn unchecked_is_right_when_the_collisions_stand_a_window_apart() {
         for _ in 0..between {
             spread.collisions.insert(1, padding);
         }
-        let config = BoardConfig { hazards: Hazards::Unchecked, ..BoardConfig::default() };
+        let config = BoardConfig { hazards: Hazards::Unchecked, ..without_queue() };
         let outcome = Machine::new(config).step(&spread).expect("the step completes");
         assert_eq!(outcome.hazards, hazards);
         assert_eq!(bits(&outcome.bodies[1])[2] == [0; 4], hazards == 0);
@@ -573,7 +569,7 @@ fn only_float_flushes_subnormals() {
     let mut scene = Step::falling(1);
     scene.bodies[0].linear = [tiny, 0.0, 0.0];
     for (profile, expected) in [(&NAIVE, tiny), (&FLOAT, 0.0)] {
-        let mut machine = Machine::new(BoardConfig { profile, ..BoardConfig::default() });
+        let mut machine = Machine::new(BoardConfig { profile, ..without_queue() });
         let outcome = machine.step(&scene).expect("the step completes");
         assert_eq!(outcome.bodies[0].linear[0].to_bits(), expected.to_bits());
     }
@@ -583,7 +579,7 @@ fn only_float_flushes_subnormals() {
 fn the_same_step_on_two_boards_gives_the_same_cycles() {
     let scene = Step::on_ground(30, 200);
     let run = || {
-        let mut machine = Machine::new(BoardConfig::default());
+        let mut machine = Machine::new(without_queue());
         let outcome = machine.step(&scene).expect("the step completes");
         (outcome.cycles, outcome.sum_sent, machine.host.board.counts())
     };

@@ -161,6 +161,19 @@ fn a_host_that_waits_for_a_whole_step_has_it_taken_at_once() {
     }
 }
 
+/// While the queue of a pass empties, the next pass's beats come as far as the FIFOs hold them: 512
+/// cycles of eight passes are more than the tolerance.
+#[test]
+fn a_pass_that_the_memory_limits_empties_its_queue_during_the_next_transfer() {
+    let step = Step::on_ground(3000, 6000);
+    for bandwidth in [Bandwidth::ZCU102_SUSTAINED, Bandwidth::BytesPerSecond(5_000_000_000)] {
+        let config = BoardConfig { bandwidth, queue: Some(256), ..board(&FLOAT, 512) };
+        let Tolerance::Limited { slices } = tolerance(&config, 8) else { panic!("no limit") };
+        assert!(slices < 8 * 512, "{slices}");
+        same(config, 1, Tolerance::Queued { slices }, |machine| machine.step(&step));
+    }
+}
+
 #[test]
 fn a_host_that_looks_in_the_middle_of_a_step_sees_the_reference() {
     let step = scene(400, 800, 7, true);

@@ -13,6 +13,7 @@ use crate::common::scene::{
     AT_REST, Body, Collision, STATIC, Step, bits, ground_contact, one_cube,
 };
 use crate::common::sg::{Machine, Outcome};
+use crate::common::without_queue;
 
 const BINARY16: StreamFormat = StreamFormat::Binary16;
 /// Sixteen bits on the streams alone.
@@ -31,7 +32,7 @@ fn config(profile: &'static Profile, numbers: Numbers) -> BoardConfig {
         profile,
         numbers: Some(numbers),
         bandwidth: Bandwidth::Unlimited,
-        ..BoardConfig::default()
+        ..without_queue()
     }
 }
 

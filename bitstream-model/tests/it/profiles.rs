@@ -14,9 +14,10 @@ use pgs_interface::stripe::{Stripe, Stripes};
 use crate::common::packing::result_beats;
 use crate::common::scene::{AT_REST, Body, Collision, STATIC, Step, bits, ground_contact};
 use crate::common::sg::{Failure, Machine, Outcome};
+use crate::common::without_queue;
 
 fn config(profile: &'static Profile) -> BoardConfig {
-    BoardConfig { profile, bandwidth: Bandwidth::Unlimited, ..BoardConfig::default() }
+    BoardConfig { profile, bandwidth: Bandwidth::Unlimited, ..without_queue() }
 }
 
 /// Every profile with every format of its streams and both inertias.
@@ -452,8 +453,13 @@ fn a_profile_larger_than_registers_tables_and_fifos_is_refused() {
         assert!(text.contains(expected), "{text}");
     }
     // Sixteen collisions of seven beats need a FIFO of 112.
-    static SIXTEEN: Profile =
-        Profile { collisions_per_issue: 16, shape_capacity: 192, stripes: COLD, ..FLOAT };
+    static SIXTEEN: Profile = Profile {
+        collisions_per_issue: 16,
+        queue: None,
+        shape_capacity: 192,
+        stripes: COLD,
+        ..FLOAT
+    };
     let with = |fifo_beats| {
         let delays = Delays { fifo_beats, ..Delays::default() };
         BoardConfig { delays, ..config(&SIXTEEN) }

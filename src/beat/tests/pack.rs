@@ -4,13 +4,13 @@
 use bytemuck::Zeroable as _;
 use proptest::prelude::*;
 
-use crate::beat::pack::bodies::{pack_bodies, survey};
-use crate::beat::pack::collisions::{Entries, pack_collisions};
-use crate::beat::pack::pool::PackPool;
-use crate::beat::pack::target::Target;
-use crate::beat::stripe::BLOCK;
-use crate::beat::stripe::Segment;
-use crate::record::body_table::{Survey, Table};
+use super::{buffers, scene, surveyed, views};
+use crate::beat::Target;
+use crate::beat::bodies::{Survey, pack_bodies};
+use crate::beat::collisions::{Entries, pack_collisions};
+use crate::beat::pool::PackPool;
+use crate::beat::stripe::{BLOCK, Segment};
+use crate::record::body_table::Table;
 use crate::scene::{
     Bodies, Body, BodyArrays, Collision, CollisionArrays, Collisions, Contact, Pose, Shape,
     Structures, Velocity,
@@ -187,12 +187,8 @@ fn packed(
     records: usize,
     pack: impl FnOnce(&mut [&mut [Beat]]) -> u32,
 ) -> Vec<Vec<Beat>> {
-    let layout = segment.layout(&spec.variant);
-    let mut buffers: Vec<_> = (0..spec.channels)
-        .map(|channel| vec![Beat([u32::MAX; 4]); layout.beats_on_channel(records, channel)])
-        .collect();
-    let mut views: Vec<&mut [Beat]> = buffers.iter_mut().map(Vec::as_mut_slice).collect();
-    let sum = pack(&mut views);
+    let mut buffers = buffers(&spec.variant, segment, records);
+    let sum = pack(&mut views(&mut buffers));
     let words = buffers.iter().flatten().flat_map(|beat| beat.0);
     assert_eq!(sum, words.fold(0, u32::wrapping_add), "padding counts");
     buffers
@@ -210,12 +206,14 @@ fn packed_bodies(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> [Vec<Vec<Beat>
     let (mut ends, mut statics) = (Table::default(), Vec::new());
     let into = Survey { ends: &mut ends, statics: &mut statics };
     let (count, packers) = (bodies.len(), &mut PackPool::alone());
+    let scene = scene(&spec.variant, &SHAPES);
+    let target = Target { scene: &scene, streamed_masses: false };
     let mut velocities = Vec::new();
     let poses = packed(spec, Segment::Poses, count, |poses| {
         let mut of_poses = 0;
         velocities = packed(spec, Segment::Velocities, count, |views| {
             let places = (views, poses);
-            let (sum, other, _) = pack_bodies(target(spec), bodies, count, into, places, packers);
+            let (sum, other, _) = pack_bodies(target, bodies, count, into, places, packers);
             of_poses = other;
             sum
         });
@@ -234,10 +232,6 @@ fn poses(spec: &Spec, bodies: &(impl Bodies + ?Sized)) -> Vec<Vec<Beat>> {
     poses
 }
 
-fn target(spec: &Spec) -> Target<'_> {
-    Target { variant: &spec.variant, shapes: &SHAPES, streamed_masses: false, quick: None }
-}
-
 /// The beats of collisions.
 fn collisions(
     spec: &Spec,
@@ -245,12 +239,13 @@ fn collisions(
     collisions: &(impl Collisions + ?Sized),
 ) -> Vec<Vec<Beat>> {
     let count = collisions.len();
-    let (mut ends, mut statics) = (Table::default(), Vec::new());
-    let into = Survey { ends: &mut ends, statics: &mut statics };
-    survey(target(spec), bodies, bodies.len(), into, &mut PackPool::alone());
+    let scene = scene(&spec.variant, &SHAPES);
+    let target = Target { scene: &scene, streamed_masses: false };
+    let (table, _) = surveyed(target, bodies);
     let entries = Entries { collisions, count, added: None };
     packed(spec, Segment::Collisions, count, |views| {
-        pack_collisions(target(spec), ends.ends(), &entries, views, &mut PackPool::alone()).0
+        let packers = &mut PackPool::alone();
+        pack_collisions(target, table.ends(), &entries, views, None, packers).sum
     })
 }
 
@@ -478,28 +473,20 @@ fn bodies_beyond_sixteen_bits_are_looked_up_by_all_their_bits() {
     }
 }
 
-/// No profile has room for these bodies. If they come here nevertheless, the packer writes no
-/// collision.
+/// No profile has room for these bodies. If they come here nevertheless, the packer refuses all
+/// collisions.
 #[test]
 fn more_bodies_than_a_stream_has_indices_for_are_refused() {
     let list = [Collision::NOTHING; BLOCK];
     let entries = Entries { collisions: &list[..], count: BLOCK, added: None };
+    let scene = scene(&HALF_SPEC.variant, &SHAPES);
+    let target = Target { scene: &scene, streamed_masses: false };
     for (count, fits) in [(1 << 16, true), ((1 << 16) + 1, false)] {
-        let bodies = vec![Body { shape: 1, ..Body::zeroed() }; count];
-        let (mut ends, mut statics) = (Table::default(), Vec::new());
-        let into = Survey { ends: &mut ends, statics: &mut statics };
-        survey(target(&HALF_SPEC), &bodies, count, into, &mut PackPool::alone());
-        let layout = Segment::Collisions.layout(&HALF_SPEC.variant);
-        let ones = Beat([u32::MAX; 4]);
-        let mut buffers: [Vec<Beat>; 3] =
-            std::array::from_fn(|channel| vec![ones; layout.beats_on_channel(BLOCK, channel)]);
-        let mut views = buffers.each_mut().map(Vec::as_mut_slice);
-        let packers = &mut PackPool::alone();
-        let (_, seen) =
-            pack_collisions(target(&HALF_SPEC), ends.ends(), &entries, &mut views, packers);
-        assert_eq!(seen.good, fits, "{count}");
-        let untouched = buffers.iter().flatten().filter(|beat| **beat == ones).count();
-        assert_eq!(untouched, if fits { 0 } else { layout.beats(BLOCK) }, "{count}");
+        let (table, _) = surveyed(target, &vec![Body { shape: 1, ..Body::zeroed() }; count]);
+        let mut buffers = buffers(&HALF_SPEC.variant, Segment::Collisions, BLOCK);
+        let (views, packers) = (&mut views(&mut buffers), &mut PackPool::alone());
+        let packed = pack_collisions(target, table.ends(), &entries, views, None, packers);
+        assert_eq!(packed.good, fits, "{count}");
     }
 }
 

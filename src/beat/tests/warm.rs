@@ -3,15 +3,14 @@
 use half::f16;
 use proptest::prelude::*;
 
-use crate::beat::pack::bodies::survey;
-use crate::beat::pack::collisions::{Entries, pack_collisions};
-use crate::beat::pack::impulses::{WarmSegments, pack_warm};
-use crate::beat::pack::pool::{PackPool, RANGE};
-use crate::beat::pack::target::Target;
+use super::{buffers, scene, surveyed, views};
+use crate::beat::Target;
+use crate::beat::collisions::{Entries, pack_collisions};
+use crate::beat::impulses::WarmSegments;
+use crate::beat::pool::{PackPool, RANGE};
 use crate::beat::stripe::{Place, Segment};
-use crate::record::body_table::{Survey, Table};
 use crate::scene::{Body, Collision, Contact, Impulses, Pose, Shape, Velocity, WarmCollisions};
-use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile, Variant};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 use pgs_interface::record::Beat;
 
 const SHAPES: [Shape; 2] = [Shape::STATIC, Shape::isotropic(1.0, 1.5)];
@@ -20,14 +19,6 @@ const BODIES: u16 = 7;
 
 /// Beats of an issue in every pass, and in a warm pass, by hand.
 const BEATS_OF_ISSUE: [usize; 2] = [7, 8];
-
-/// Buffers full of ones, so that a missing beat shows.
-fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
-    let layout = segment.layout(variant);
-    let beats = |channel| layout.beats_on_channel(records, channel);
-    let channels = 0..variant.profile.mm2s_widths.len();
-    channels.map(|channel| vec![Beat([u32::MAX; 4]); beats(channel)]).collect()
-}
 
 /// The words of rows of impulses in a beat.
 fn beat_of(profile: &Profile, rows: &[[f32; 4]]) -> Beat {
@@ -91,27 +82,25 @@ proptest! {
         let (collisions, impulses): (Vec<_>, Vec<_>) =
             some.iter().copied().cycle().take(count).unzip();
         let mut packers = PackPool::new(Some(threads));
-        let target =
-            Target { variant: &variant, shapes: &SHAPES, streamed_masses: false, quick: None };
+        let scene = scene(&variant, &SHAPES);
+        let target = Target { scene: &scene, streamed_masses: false };
         let bodies: Vec<Body> = (0..BODIES).map(body).collect();
-        let (mut table, mut statics) = (Table::default(), Vec::new());
-        let into = Survey { ends: &mut table, statics: &mut statics };
-        survey(target, &bodies, bodies.len(), into, &mut packers);
+        let (table, _) = surveyed(target, &bodies);
         let mut usual = buffers(&variant, Segment::Collisions, count);
-        let mut views: Vec<&mut [Beat]> = usual.iter_mut().map(Vec::as_mut_slice).collect();
-        let entries = Entries { collisions: &collisions, count, added: None };
-        let (sum, _) = pack_collisions(target, table.ends(), &entries, &mut views, &mut packers);
-
         let channel = profile.mm2s_widths.len() - 1;
         let mut kinds = [(); 2].map(|()| {
             buffers(&variant, Segment::WarmCollisions, count).remove(channel)
         });
         let [contact, friction] = &mut kinds;
-        let segments = WarmSegments { contact, friction };
+        let segments = Some(WarmSegments { channel, contact, friction });
         let warm = WarmCollisions { collisions: &collisions, impulses: &impulses };
-        let sums =
-            pack_warm(&variant, channel, table.ends(), (&warm, count), segments, &mut packers);
-        prop_assert_eq!((sums.records, sums.broken), (sum, false));
+        let entries = Entries { collisions: &warm, count, added: None };
+        let views = &mut views(&mut usual);
+        let packed =
+            pack_collisions(target, table.ends(), &entries, views, segments, &mut packers);
+        let words = usual.iter().flatten().flat_map(|beat| beat.0);
+        prop_assert_eq!(packed.sum, words.fold(0, u32::wrapping_add), "without the impulses");
+        let sums = packed.warm;
 
         let layouts = [Segment::Collisions, Segment::WarmCollisions].map(|of| of.layout(&variant));
         let [in_every_pass, all] = BEATS_OF_ISSUE;
@@ -159,5 +148,44 @@ proptest! {
             words.fold(0, u32::wrapping_add)
         };
         prop_assert_eq!([sums.contact, sums.friction], [impulse_sum(0), impulse_sum(1)]);
+    }
+}
+
+/// Impulses are in range of their bitstream, or the step is refused.
+#[test]
+fn an_impulse_beyond_the_range_is_noticed_whichever_it_is() {
+    let normal = [0.0, 1.0, 0.0];
+    let contacts = [Contact { point: [0.5, 1.0, -1.0], distance: 0.0 }; 4];
+    let collision = Collision { body_a: 1, body_b: 2, normal, count: 3, contacts };
+    for profile in PROFILES {
+        let (variant, largest) = (profile.default_variant(), profile.numbers.collisions.largest());
+        let scene = scene(&variant, &SHAPES);
+        let target = Target { scene: &scene, streamed_masses: false };
+        let (table, _) = surveyed(target, &(0..BODIES).map(body).collect::<Vec<_>>());
+        let channel = profile.mm2s_widths.len() - 1;
+        let good = |impulses: Impulses| {
+            let list = [collision; 7];
+            let mut impulses_of = [Impulses::ZERO; 7];
+            impulses_of[5] = impulses;
+            let warm = WarmCollisions { collisions: &list, impulses: &impulses_of };
+            let entries = Entries { collisions: &warm, count: 7, added: None };
+            let mut usual = buffers(&variant, Segment::Collisions, 7);
+            let mut contact = buffers(&variant, Segment::WarmCollisions, 7).remove(channel);
+            // Without friction passes no friction impulse is sent, and all are checked.
+            let segments = WarmSegments { channel, contact: &mut contact, friction: &mut [] };
+            let views = &mut views(&mut usual);
+            let packers = &mut PackPool::alone();
+            pack_collisions(target, table.ends(), &entries, views, Some(segments), packers).good
+        };
+        for value in [f32::NAN, -f32::INFINITY, largest.next_up(), -largest.next_up()] {
+            for at in 0..6 {
+                let mut impulses = Impulses { normal: [largest; 4], friction: [-largest; 2] };
+                assert!(good(impulses));
+                let mut all = impulses.normal.iter_mut().chain(&mut impulses.friction);
+                *all.nth(at).expect("one of six") = value;
+                // The fourth point is not in use.
+                assert_eq!(good(impulses), at == 3, "{} {value} {at}", profile.name);
+            }
+        }
     }
 }

@@ -6,8 +6,6 @@ use proptest::prelude::*;
 use super::super::*;
 use crate::scene::{Body, Collision, Contact, Pose, Shape, Velocity};
 
-const ORDERS: [Order; 3] = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];
-
 /// Pairs of bodies, and how many empty collisions stand before each of them and behind the last.
 fn scene() -> impl Strategy<Value = (Vec<bool>, Vec<[u32; 2]>, Vec<usize>)> {
     (2_u32..30).prop_flat_map(|count| {
@@ -38,15 +36,14 @@ proptest! {
         depth in 1_u32..12,
         per_issue in 1_u32..3,
     ) {
-        let positions: Vec<[f32; 3]> = (0..moving.len()).map(|at| [at as f32, 0.0, 0.5]).collect();
-        let input = OrderInput { pairs: &pairs, moving: &moving, positions: &positions };
+        let input = OrderInput { pairs: &pairs, moving: &moving };
         let (all, places) = spread(&pairs, &gaps);
         let with_empty = OrderInput { pairs: &all, ..input };
         let window = IssueWindow::new(depth, per_issue).expect("a window");
         let named = |schedule: &Schedule| -> Vec<Option<u32>> {
             schedule.iter().map(|at| at.map(|at| places[at as usize])).collect()
         };
-        for order in ORDERS {
+        for order in [Order::AsGiven, Order::HazardFree] {
             let (mut one, mut other) = (Orderer::new(), Orderer::new());
             let expected = one.order(&input, order, window).expect("an order");
             let found = other.order(&with_empty, order, window).expect("an order");
@@ -61,27 +58,19 @@ proptest! {
             }
             let found = other.schedule();
             prop_assert_eq!(found.iter().collect::<Vec<_>>(), expected, "{:?}", order);
-            prop_assert_eq!((one.made(), one.schedule().empty()), (other.made(), found.empty()));
+            prop_assert_eq!(one.schedule().empty(), found.empty());
             let verified = |schedule, input| Checker::new().verify(schedule, input, window).is_ok();
             prop_assert_eq!(verified(found, &with_empty), verified(one.schedule(), &input));
-            let measured = |schedule, input| OrderReport::measure(schedule, input, window);
-            prop_assert_eq!(measured(found, &with_empty), measured(one.schedule(), &input));
         }
     }
 }
 
 #[test]
 fn an_entry_may_hold_an_empty_collision_which_uses_no_body() {
-    let input = OrderInput {
-        pairs: &[[0, 1], OrderInput::EMPTY, [1, 2]],
-        moving: &[true; 3],
-        positions: &[[0.0; 3]; 3],
-    };
+    let input = OrderInput { pairs: &[[0, 1], OrderInput::EMPTY, [1, 2]], moving: &[true; 3] };
     let window = IssueWindow::new(2, 1).expect("a window");
     let schedule: Schedule = [Some(0), Some(1), Some(2)].into_iter().collect();
     assert_eq!(Checker::new().verify(&schedule, &input, window), Ok(()));
-    let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
-    assert_eq!((report.hazards, report.longest_span), (0, 2));
     let lacks: Schedule = [Some(0)].into_iter().collect();
     let missing = Checker::new().verify(&lacks, &input, window);
     assert_eq!(missing, Err(OrderError::Missing { collision: 2 }));

@@ -84,13 +84,7 @@ impl DmaMemorySource for EmulatedPlatform {
         Ok((address, SharedMemory::Heap(words)))
     }
 
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<()> {
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()> {
         let DmaMemory::Heap(beats) = memory else {
             unreachable!("a buffer goes back to the platform that it came from");
         };
@@ -98,11 +92,8 @@ impl DmaMemorySource for EmulatedPlatform {
             Access::Read => DeviceAccess::Read,
             Access::Write => DeviceAccess::Write,
         };
-        self.port.hand_over_first(address, beats, used, access).map_err(refused(
-            "hand over",
-            "address",
-            address,
-        ))
+        let given = self.port.hand_over_first(at, beats, used, access);
+        given.map_err(refused("hand over", "address", at))
     }
 
     fn take_back(&self, address: u64) -> Result<DmaMemory> {

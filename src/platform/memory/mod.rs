@@ -39,8 +39,7 @@ pub(crate) trait DmaMemorySource: fmt::Debug + Send + Sync {
     /// Coherent words that both sides may touch at any time.
     fn allocate_shared(&self, words: usize) -> Result<(u64, SharedMemory)>;
     /// Gives memory to the device, which will touch its first `used` beats.
-    fn hand_over(&self, address: u64, memory: DmaMemory, used: usize, access: Access)
-    -> Result<()>;
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()>;
     /// Takes memory back that the device has finished with.
     fn take_back(&self, address: u64) -> Result<DmaMemory>;
     /// Frees memory that the CPU owns, or shared words that no engine runs on.

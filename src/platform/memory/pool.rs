@@ -136,22 +136,16 @@ impl DmaMemorySource for Pool {
         self.give(bytes, |at| self.region.shared(at, words))
     }
 
-    fn hand_over(
-        &self,
-        address: u64,
-        memory: DmaMemory,
-        used: usize,
-        access: Access,
-    ) -> Result<()> {
-        let at = self.offset(address)?;
+    fn hand_over(&self, at: u64, memory: DmaMemory, used: usize, access: Access) -> Result<()> {
+        let offset = self.offset(at)?;
         let mut state = self.state();
-        match state.pieces.get_mut(&address) {
+        match state.pieces.get_mut(&at) {
             Some(Piece { handed_over: handed_over @ None, .. }) => {
-                self.region.to_device(at, &memory, used.min(memory.beats().len()), access)?;
+                self.region.to_device(offset, &memory, used.min(memory.beats().len()), access)?;
                 *handed_over = Some((memory, used, access));
                 Ok(())
             }
-            _ => Err(PlatformError::NotGivenOut { address, state: "with the CPU" }),
+            _ => Err(PlatformError::NotGivenOut { address: at, state: "with the CPU" }),
         }
     }
 

@@ -18,6 +18,7 @@ use std::time::Duration;
 use bitstream_model::{BoardConfig, Direction, EmulatedBoard, Fault as Injected, FaultKind};
 use pgs_interface::control::ErrorCode;
 use pgs_interface::profile::PROFILES;
+use pgs_interface::record::Beat;
 
 use self::tampered::{CONTROL_BLOCK, MEMORY, Tampered};
 use crate::board::open::{BoardDescription, BoardKind, Found};
@@ -383,7 +384,7 @@ fn receivers_start_before_the_accelerator_and_it_before_the_senders() {
 fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
     let (_, tampered, mut accelerator) = Tampered::open();
     for (access, way) in [(Access::Read, Direction::Mm2s), (Access::Write, Direction::S2mm)] {
-        tampered.wires().flip = Some((access, 1 << 4));
+        tampered.wires().spoil = Some((access, |beats| beats[0].0[0] ^= 1 << 4));
         let (result, bodies) = step(&mut accelerator, 20);
         let error = result.expect_err("a flipped bit");
         let Error::Step { fault, .. } = &error else { panic!("{error}") };
@@ -397,6 +398,40 @@ fn a_bit_that_flips_on_the_way_is_found_by_the_sums() {
         result.expect("the next step is undisturbed");
         assert_eq!(bits(&bodies), undisturbed(20));
     }
+}
+
+/// The sums of all words stay right: nothing but the numbers tells.
+#[test]
+fn a_queue_whose_numbers_are_no_permutation_fails_the_step_and_changes_nothing() {
+    let queue = Some(64);
+    let board = EmulatedBoard::new(BoardConfig { queue, ..BoardConfig::default() });
+    let (tampered, mut accelerator) = Tampered::on(&board.expect("a board that can be built"));
+    let parameters = StepParameters::default().with_impulses_out(true);
+    let (mut bodies, collisions) = scene(20);
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
+    let (before, impulses) = (bits(&bodies), accelerator.impulses().to_vec());
+    // On a static ground nothing waits: beat 4 has the numbers 0 to 3.
+    let spoils: [(fn(&mut [Beat]), &str); 2] = [
+        (|beats| beats[4].0 = [1, 1, 2, 2], "found number 1 at place 1, for the second time"),
+        (|beats| beats[4].0 = [20, 1_u32.wrapping_sub(20), 2, 3], "found number 20 at place 0"),
+    ];
+    for (spoil, says) in spoils {
+        tampered.wires().spoil = Some((Access::Write, spoil));
+        let error = accelerator.step(&mut bodies, &collisions, &parameters).expect_err("wrong");
+        let Error::Step { fault, aftermath: Aftermath::Ready, .. } = &error else {
+            panic!("{error}")
+        };
+        assert_eq!(fault.name(), "impulse-number");
+        assert!(fault.to_string().contains(says), "{fault}");
+        assert_eq!(bits(&bodies), before);
+        assert_eq!(accelerator.impulses(), impulses);
+    }
+    let mut twice = bodies.clone();
+    accelerator.step(&mut bodies, &collisions, &parameters).expect("the next step");
+    tampered.wires().spoil = Some((Access::Write, spoils[0].0));
+    let parameters = parameters.with_retries(1);
+    accelerator.step(&mut twice, &collisions, &parameters).expect("another try");
+    assert_eq!(bits(&twice), bits(&bodies));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use bitstream_model::{BoardConfig, EmulatedBoard};
 use pgs_interface::descriptor::{STATUS, WORDS};
+use pgs_interface::record::Beat;
 
 use super::open_on;
 use crate::platform::{
@@ -65,8 +66,8 @@ pub(crate) struct Wires {
     /// The number of the wait for an interrupt in which the caller cancels; 0 for no wait.
     pub(crate) cancel_at: u32,
     pub(crate) cancellation: Cancellation,
-    /// Flips these bits in the first word of the next buffer that the device reads, or has written.
-    pub(crate) flip: Option<(Access, u32)>,
+    /// Changes the beats of the next buffer that the device reads, or has written.
+    pub(crate) spoil: Option<(Access, Spoil)>,
     /// Every register write: region and offset. An allocation of memory, or its hand-over, counts
     /// as a write to [`MEMORY`].
     pub(crate) writes: Vec<(usize, u32)>,
@@ -76,10 +77,13 @@ pub(crate) struct Wires {
     pub(crate) unplug_after: u32,
 }
 
+/// Changes the beats of a buffer.
+type Spoil = fn(&mut [Beat]);
+
 impl Wires {
-    fn flip(&mut self, memory: &mut DmaMemory, access: Access) {
-        if let Some((_, bits)) = self.flip.take_if(|(wanted, _)| *wanted == access) {
-            memory.beats_mut()[0].0[0] ^= bits;
+    fn spoil(&mut self, memory: &mut DmaMemory, access: Access) {
+        if let Some((_, spoil)) = self.spoil.take_if(|(wanted, _)| *wanted == access) {
+            spoil(memory.beats_mut());
         }
     }
 }
@@ -217,7 +221,7 @@ impl DmaMemorySource for Tampered {
         access: Access,
     ) -> Result<(), PlatformError> {
         if access == Access::Read {
-            self.wires().flip(&mut memory, access);
+            self.wires().spoil(&mut memory, access);
         }
         self.wires().writes.push((MEMORY, 0));
         self.inner.hand_over(address, memory, used, access)
@@ -225,7 +229,7 @@ impl DmaMemorySource for Tampered {
 
     fn take_back(&self, address: u64) -> Result<DmaMemory, PlatformError> {
         let mut memory = self.inner.take_back(address)?;
-        self.wires().flip(&mut memory, Access::Write);
+        self.wires().spoil(&mut memory, Access::Write);
         Ok(memory)
     }
 

@@ -16,11 +16,10 @@
 //! written, medians, GB/s of these bytes, and the throughput relative to that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
-//! - `as given`, `in order`: collisions alone, in array order and in an order without hazards: the
-//!   one that is the default on a bitstream that does not wait, or `--order`, in the window of
-//!   `float`
-//! - `step, ...`: bodies, then collisions
-//! - `checked, ...`: the same with the validation of everything on the way, as a step does it
+//! - `as given`, `in order`: bodies, then collisions in array order and in an order without
+//!   hazards: the one that is the default on a bitstream that does not wait, or `--order`, in the
+//!   window of `float`
+//! - `warm`: the same in order, with impulses to begin with
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
 //!
@@ -47,9 +46,9 @@ use bitstream_model::interface::profile::{FLOAT, HALF, Profile};
 use bitstream_model::interface::record::{BEAT_BYTES, Beat};
 use clap::{Parser, ValueEnum};
 use scene::Grid;
-use zynq_pgs::Collision;
 use zynq_pgs::bench::{StepPacker, Unpacker};
 use zynq_pgs::order::{Ordered, Schedule};
+use zynq_pgs::{Collision, Impulses, InputError, StepParameters, WarmCollisions};
 
 /// Compares packing and unpacking with `memcpy` of the same bytes.
 #[derive(Debug, Parser)]
@@ -76,7 +75,7 @@ struct Options {
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
     /// The order for `in order`, one without hazards
-    #[arg(long, value_enum, default_value_t = Sent::HazardFreeNearby)]
+    #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
     order: Sent,
     /// Measure this item only
     #[arg(long, value_enum)]
@@ -130,10 +129,7 @@ enum Thing {
     Bodies,
     AsGiven,
     InOrder,
-    StepAsGiven,
-    StepInOrder,
-    CheckedAsGiven,
-    CheckedInOrder,
+    Warm,
     Unpack,
     Commit,
 }
@@ -149,10 +145,7 @@ impl Thing {
             Self::Bodies => "bodies",
             Self::AsGiven => "as given",
             Self::InOrder => "in order",
-            Self::StepAsGiven => "step, as given",
-            Self::StepInOrder => "step, in order",
-            Self::CheckedAsGiven => "checked, as given",
-            Self::CheckedInOrder => "checked, in order",
+            Self::Warm => "warm",
             Self::Unpack => "unpack",
             Self::Commit => "commit",
         }
@@ -200,7 +193,7 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
-    let schedule = step.schedule(BoardConfig::default(), options.order.without_hazards()?)?;
+    let schedule = step.schedule(BoardConfig::default(), options.order.made()?)?;
     let order = options.order.name();
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     println!(
@@ -235,7 +228,9 @@ fn measure(
     options: &Options,
 ) -> Result<Row, Box<dyn Error>> {
     let Step { bodies, collisions, shapes, .. } = step;
-    let ordered = Ordered { collisions, schedule };
+    let impulses = vec![Impulses { normal: [1.0; 4], friction: [0.5; 2] }; collisions.len()];
+    let warm = &WarmCollisions { collisions, impulses: &impulses };
+    let ordered = &Ordered { collisions: warm, schedule };
     let variant = profile.default_variant();
     let mut threads = vec![Some(usize::from(options.threads))];
     if options.threads > 1 {
@@ -249,31 +244,21 @@ fn measure(
         _ => Vec::new(),
     };
     let mut moved = bodies.clone();
-    // The packed bodies and the unpacked results are inputs of later items. A refused scene stops
-    // here: otherwise the benchmark would measure the refusal.
+    // The unpacked results are input of a later item. A refused scene stops here: otherwise the
+    // benchmark would measure the refusal.
     for unpacker in &mut unpackers {
         unpacker.unpack(bodies).ok_or("the results are refused")?;
     }
     for packer in &mut packers {
-        packer.pack_bodies(bodies, shapes);
-        let added = Some(schedule.empty());
-        match thing {
-            Thing::AsGiven | Thing::StepAsGiven => packer.pack_collisions(collisions, shapes, None),
-            Thing::InOrder | Thing::StepInOrder => packer.pack_collisions(&ordered, shapes, added),
-            Thing::CheckedAsGiven => packer.pack(bodies, collisions, shapes, None)?,
-            Thing::CheckedInOrder => packer.pack(bodies, &ordered, shapes, added)?,
-            Thing::Bodies | Thing::Unpack | Thing::Commit => Some(0),
-        }
-        .ok_or("the step is refused, or has too few collisions")?;
+        pack(thing, packer, step, ordered)?.ok_or("the step is refused")?;
     }
     let [of_bodies, of_collisions] = packers[0].bytes(bodies.len(), collisions.len());
     let [_, of_entries] = packers[0].bytes(bodies.len(), schedule.len());
     let bytes = match thing {
         Thing::Bodies => of_bodies,
-        Thing::AsGiven => of_collisions,
-        Thing::InOrder => of_entries,
-        Thing::StepAsGiven | Thing::CheckedAsGiven => of_bodies + of_collisions,
-        Thing::StepInOrder | Thing::CheckedInOrder => of_bodies + of_entries,
+        Thing::AsGiven => of_bodies + of_collisions,
+        // Beside the collisions of every pass, those of the warm passes are few.
+        Thing::InOrder | Thing::Warm => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
     };
     let buffer = || vec![Beat([1; 4]); bytes / BEAT_BYTES];
@@ -292,8 +277,11 @@ fn measure(
             unpackers[0].commit(&mut moved);
             black_box(&moved);
         })),
-        _ => contestants
-            .extend(packers.iter_mut().map(|packer| packing(thing, packer, step, &ordered))),
+        _ => contestants.extend(packers.iter_mut().map(|packer| -> Run<'_> {
+            Box::new(move || {
+                let _ = black_box(pack(thing, packer, black_box(step), ordered));
+            })
+        })),
     }
     let times = warm_medians(options.common.runs(), options.clock(), &mut contestants);
     let [copy, time, alone @ ..] = &times[..] else { return Err("a time for each".into()) };
@@ -301,33 +289,22 @@ fn measure(
     Ok(Row { profile, thing, bytes, time, copy, alone })
 }
 
-/// The packing run of an item; none if the item does not pack.
-fn packing<'a>(
+/// Packs an item; the sum of the words, unless something is refused.
+fn pack(
     thing: Thing,
-    packer: &'a mut StepPacker,
-    step: &'a Step,
-    ordered: &'a Ordered<'a, Vec<Collision>>,
-) -> Run<'a> {
+    packer: &mut StepPacker,
+    step: &Step,
+    ordered: &Ordered<'_, WarmCollisions<'_, Vec<Collision>>>,
+) -> Result<Option<u32>, InputError> {
     let Step { bodies, collisions, shapes, .. } = step;
-    let added = Some(ordered.schedule.empty());
-    Box::new(move || {
-        if matches!(thing, Thing::Bodies | Thing::StepAsGiven | Thing::StepInOrder) {
-            black_box(packer.pack_bodies(black_box(bodies), shapes));
+    let with = (Some(ordered.schedule.empty()), &StepParameters::default());
+    match thing {
+        Thing::Bodies => packer.pack(bodies, &[][..], shapes, (None, with.1)),
+        Thing::AsGiven => packer.pack(bodies, collisions, shapes, (None, with.1)),
+        Thing::InOrder => packer.pack(bodies, ordered, shapes, with),
+        Thing::Warm => {
+            packer.pack(bodies, ordered, shapes, (with.0, &with.1.with_warm_start(true)))
         }
-        match thing {
-            Thing::AsGiven | Thing::StepAsGiven => {
-                black_box(packer.pack_collisions(black_box(collisions), shapes, None));
-            }
-            Thing::InOrder | Thing::StepInOrder => {
-                black_box(packer.pack_collisions(black_box(ordered), shapes, added));
-            }
-            Thing::CheckedAsGiven => {
-                let _ = black_box(packer.pack(bodies, black_box(collisions), shapes, None));
-            }
-            Thing::CheckedInOrder => {
-                let _ = black_box(packer.pack(bodies, black_box(ordered), shapes, added));
-            }
-            Thing::Bodies | Thing::Unpack | Thing::Commit => {}
-        }
-    })
+        Thing::Unpack | Thing::Commit => Ok(Some(0)),
+    }
 }

@@ -60,10 +60,10 @@ impl Pile {
 pub enum Sent {
     /// As the step has them
     AsGiven,
-    /// Without hazards, in a sweep through the scene
-    HazardFree,
+    /// Far places of the step in turn, for an issue queue
+    Interleaved,
     /// Without hazards, near the order of the step
-    HazardFreeNearby,
+    HazardFree,
 }
 
 impl Sent {
@@ -73,15 +73,15 @@ impl Sent {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// The driver's order, if it is one without hazards.
+    /// The driver's order, if it is one that has to be made.
     ///
     /// # Errors
     ///
-    /// Names the orders without hazards if this is none.
-    pub fn without_hazards(self) -> Result<Order, String> {
+    /// Names the orders that are made if this is none.
+    pub fn made(self) -> Result<Order, String> {
         match self {
-            Self::AsGiven => Err("--order is hazard-free or hazard-free-nearby here".to_owned()),
-            Self::HazardFree | Self::HazardFreeNearby => Ok(self.order()),
+            Self::AsGiven => Err("--order is interleaved or hazard-free here".to_owned()),
+            Self::Interleaved | Self::HazardFree => Ok(self.order()),
         }
     }
 
@@ -90,8 +90,8 @@ impl Sent {
     pub const fn order(self) -> Order {
         match self {
             Self::AsGiven => Order::AsGiven,
+            Self::Interleaved => Order::Interleaved,
             Self::HazardFree => Order::HazardFree,
-            Self::HazardFreeNearby => Order::HazardFreeNearby,
         }
     }
 }

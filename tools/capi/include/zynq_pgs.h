@@ -22,6 +22,12 @@
 // Largest number of contact points of a collision.
 #define ZPGS_CONTACT_POINTS 4
 
+// `collision` of a `zpgs_place` that the last step did not have.
+#define ZPGS_NEW_COLLISION UINT32_MAX
+
+// A point of a `zpgs_place` that the collision did not have.
+#define ZPGS_NEW_POINT UINT8_MAX
+
 // Version of the binary interface: the number in the shared library's name. It grows when a
 // program that was built with an older header would no longer work.
 #define ZPGS_ABI_VERSION 0
@@ -69,9 +75,9 @@ typedef enum zpgs_order {
     // As the caller gives them.
     ZPGS_ORDER_AS_GIVEN = 1,
     // No hazards, collisions near to their given places.
-    ZPGS_ORDER_HAZARD_FREE_NEARBY = 2,
-    // No hazards and few bodies alive.
     ZPGS_ORDER_HAZARD_FREE = 3,
+    // Far places of the list in turn, for a board with an issue queue.
+    ZPGS_ORDER_INTERLEAVED = 8,
 } zpgs_order;
 
 // An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.
@@ -179,6 +185,15 @@ typedef struct zpgs_bodies {
     struct zpgs_strided_const shapes;
 } zpgs_bodies;
 
+// Where a collision was in the last step of its world.
+typedef struct zpgs_place {
+    // Its index among the collisions of that step, or `ZPGS_NEW_COLLISION`.
+    uint32_t collision;
+    // For each contact point its index among the points of that collision, or `ZPGS_NEW_POINT`.
+    // The elements from the number of points on count for nothing, but must be valid.
+    uint8_t points[ZPGS_CONTACT_POINTS];
+} zpgs_place;
+
 // The collisions of a step, in the caller's own memory.
 //
 // During a call no thread writes them. A step refuses them where they share a byte with the
@@ -191,8 +206,15 @@ typedef struct zpgs_collisions {
     // The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     struct zpgs_strided_const collisions;
     // The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each
-    // collision. Null without a warm start.
+    // collision. Null without a warm start, and where the impulses come by place.
     struct zpgs_strided_const impulses;
+    // Where each collision was in the last step of its world that `zpgs_commit` has kept: a
+    // dense array. Null without a warm start by place.
+    const struct zpgs_place *places;
+    // The share of the impulses at the places that a step begins with, such as 0.85.
+    float factor;
+    // The world: any number. Each one has a last step of its own.
+    uint32_t world;
 } zpgs_collisions;
 
 // Counts and times of one step. The caller sets `size` to `sizeof(zpgs_report)` before the call.
@@ -366,6 +388,19 @@ enum zpgs_status zpgs_wait(struct zpgs_accelerator *accelerator,
 enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
                                     struct zpgs_strided impulses,
                                     size_t count);
+
+// Keeps the impulses of the last step that succeeded with `impulses_out`, for the places of the
+// next step of the same world. `collisions` are the ones of that step, unchanged; its `world` names
+// the world, its places are not looked at. Call it after each step that has succeeded, before
+// another one of the accelerator ends, and after no other: a step that failed then begins with the
+// same impulses when it is given again.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`
+// is null or the address of its structure, with the size in it, whose arrays are as it describes;
+// no other thread writes them during the call.
+enum zpgs_status zpgs_commit(struct zpgs_accelerator *accelerator,
+                             const struct zpgs_collisions *collisions);
 
 // Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 // board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.

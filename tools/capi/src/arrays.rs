@@ -3,6 +3,8 @@
 
 use std::ffi::c_void;
 
+use crate::collision::Place;
+
 /// An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
 ///
 /// Address and stride are multiples of 4, and the stride is at least the size of an element. An
@@ -67,6 +69,13 @@ pub struct CollisionArray {
     /// The collisions: `zpgs_collision`. A step reads a dense array without a copy.
     pub collisions: StridedConst,
     /// The impulses that a step with `warm_start` begins with: `zpgs_impulses`, one for each
-    /// collision. Null without a warm start.
+    /// collision. Null without a warm start, and where the impulses come by place.
     pub impulses: StridedConst,
+    /// Where each collision was in the last step of its world that `zpgs_commit` has kept: a
+    /// dense array. Null without a warm start by place.
+    pub places: *const Place,
+    /// The share of the impulses at the places that a step begins with, such as 0.85.
+    pub factor: f32,
+    /// The world: any number. Each one has a last step of its own.
+    pub world: u32,
 }

@@ -45,10 +45,32 @@ pub struct Impulses {
     pub friction: [f32; 2],
 }
 
-/// The driver reads the collisions and impulses of C where they lie.
+/// `collision` of a `zpgs_place` that the last step did not have.
+pub const ZPGS_NEW_COLLISION: u32 = u32::MAX;
+
+/// A point of a `zpgs_place` that the collision did not have.
+pub const ZPGS_NEW_POINT: u8 = u8::MAX;
+
+/// Where a collision was in the last step of its world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub struct Place {
+    /// Its index among the collisions of that step, or `ZPGS_NEW_COLLISION`.
+    pub collision: u32,
+    /// For each contact point its index among the points of that collision, or `ZPGS_NEW_POINT`.
+    /// The elements from the number of points on count for nothing, but must be valid.
+    pub points: [u8; ZPGS_CONTACT_POINTS],
+}
+
+/// The driver reads the collisions, impulses and places of C where they lie.
 const _: () = {
     use zynq_pgs::scene::CONTACT_POINTS;
-    use zynq_pgs::{Collision as Driver, Contact as Point, Impulses as Sums};
+    use zynq_pgs::{Collision as Driver, Contact as Point, Impulses as Sums, Place as Driven};
+    assert!(size_of::<Place>() == size_of::<Driven>());
+    assert!(align_of::<Place>() == align_of::<Driven>());
+    assert!(offset_of!(Place, collision) == offset_of!(Driven, collision));
+    assert!(offset_of!(Place, points) == offset_of!(Driven, points));
+    assert!(Driven::NEW.collision == ZPGS_NEW_COLLISION && Driven::NEW.points[0] == ZPGS_NEW_POINT);
     assert!(size_of::<Impulses>() == size_of::<Sums>());
     assert!(align_of::<Impulses>() == align_of::<Sums>());
     assert!(offset_of!(Impulses, normal) == offset_of!(Sums, normal));

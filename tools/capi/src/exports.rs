@@ -14,7 +14,7 @@ use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
 use crate::barrier::{call, call_with};
 use crate::collision::{Collision, Impulses, count_with_friction};
 use crate::failure::Failure;
-use crate::handle::AcceleratorHandle;
+use crate::handle::{AcceleratorHandle, State};
 use crate::last_error;
 use crate::memory::{self, BodiesView, CollisionsView, Out, Span};
 use crate::parameters::Parameters;
@@ -193,7 +193,7 @@ pub unsafe extern "C" fn zpgs_step(
         let report = unsafe { Out::<Report>::optional(report) }?;
         let inputs = structures.into_iter().chain(collisions.inputs());
         outputs_apart(&bodies, report.as_ref(), None, inputs)?;
-        let done = state.idle()?.step(&mut bodies, &collisions, &parameters)?;
+        let done = state.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
     })
@@ -211,16 +211,8 @@ pub unsafe extern "C" fn zpgs_submit(
     collisions: *const CollisionArray,
     parameters: *const Parameters,
 ) -> Status {
-    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-    // returns: `# Safety` of this function.
-    let handle = unsafe { memory::handle(accelerator) };
-    call_with(handle, |state| {
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
-        // call; this call alone uses the bodies, and no thread writes the others.
-        let (bodies, collisions, parameters) =
-            unsafe { read_input(bodies, collisions, parameters) }?;
-        state.submit(&bodies, &collisions, &parameters)
-    })
+    // SAFETY: `# Safety` of this function.
+    unsafe { with_input(accelerator, bodies, collisions, parameters, State::submit) }
 }
 
 /// Waits for the step in flight and stores its results in `bodies`. The caller gives the bodies of
@@ -286,6 +278,32 @@ pub unsafe extern "C" fn zpgs_read_impulses(
     })
 }
 
+/// Keeps the impulses of the last step that succeeded with `impulses_out`, for the places of the
+/// next step of the same world. `collisions` are the ones of that step, unchanged; its `world` names
+/// the world, its places are not looked at. Call it after each step that has succeeded, before
+/// another one of the accelerator ends, and after no other: a step that failed then begins with the
+/// same impulses when it is given again.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`
+/// is null or the address of its structure, with the size in it, whose arrays are as it describes;
+/// no other thread writes them during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_commit(
+    accelerator: *mut AcceleratorHandle,
+    collisions: *const CollisionArray,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the pointer is null or leads to its structure, whose arrays live through the
+        // call; no thread writes them.
+        let collisions = unsafe { read_collisions(collisions) }?;
+        state.commit(&collisions)
+    })
+}
+
 /// Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 /// board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
 /// The step after it is not cancelled. Any thread may call it at any time, also during another
@@ -324,11 +342,35 @@ fn check_impulses(
 ) -> Result<(), Failure> {
     if parameters.warm_start && !collisions.has_impulses() {
         return Err(Failure::argument(
-            "a warm start without impulses: set impulses of zpgs_collisions, or leave warm_start 0"
+            "a warm start without impulses: set impulses or places of zpgs_collisions, or leave \
+             warm_start 0"
                 .to_owned(),
         ));
     }
     Ok(())
+}
+
+/// Acts with the input of a step.
+///
+/// # Safety
+/// As [`zpgs_step`].
+pub(crate) unsafe fn with_input<'a>(
+    accelerator: *mut AcceleratorHandle,
+    bodies: *const BodyArrays,
+    collisions: *const CollisionArray,
+    parameters: *const Parameters,
+    act: fn(&mut State, &BodiesView, &CollisionsView<'a>, &StepParameters) -> Result<(), Failure>,
+) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
+        // call; this call alone uses the bodies, and no thread writes the others.
+        let (bodies, collisions, parameters) =
+            unsafe { read_input(bodies, collisions, parameters) }?;
+        act(state, &bodies, &collisions, &parameters)
+    })
 }
 
 /// Reads and checks the input of a step.
@@ -395,7 +437,9 @@ unsafe fn read_collisions<'a>(
 ) -> Result<CollisionsView<'a>, Failure> {
     let collisions = StridedConst { data: std::ptr::null(), stride: size_of::<Collision>() };
     let impulses = StridedConst { data: std::ptr::null(), stride: size_of::<Impulses>() };
-    let nothing = CollisionArray { size: 0, count: 0, collisions, impulses };
+    let places = std::ptr::null();
+    let nothing =
+        CollisionArray { size: 0, count: 0, collisions, impulses, places, factor: 0.0, world: 0 };
     // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
     let array = unsafe { memory::read(pointer, nothing) }?;
     // SAFETY: the array is as the structure describes: `# Safety` of this function.

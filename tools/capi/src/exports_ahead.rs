@@ -4,8 +4,8 @@
 
 use crate::arrays::{BodyArrays, CollisionArray};
 use crate::barrier::call_with;
-use crate::exports::{outputs_apart, read_bodies, read_input};
-use crate::handle::AcceleratorHandle;
+use crate::exports::{outputs_apart, read_bodies, with_input};
+use crate::handle::{AcceleratorHandle, State};
 use crate::memory::{self, Out, Span};
 use crate::parameters::Parameters;
 use crate::report::Report;
@@ -24,16 +24,8 @@ pub unsafe extern "C" fn zpgs_prepare(
     collisions: *const CollisionArray,
     parameters: *const Parameters,
 ) -> Status {
-    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-    // returns: `# Safety` of this function.
-    let handle = unsafe { memory::handle(accelerator) };
-    call_with(handle, |state| {
-        // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
-        // call; this call alone uses the bodies, and no thread writes the others.
-        let (bodies, collisions, parameters) =
-            unsafe { read_input(bodies, collisions, parameters) }?;
-        state.prepare(&bodies, &collisions, &parameters)
-    })
+    // SAFETY: `# Safety` of this function.
+    unsafe { with_input(accelerator, bodies, collisions, parameters, State::prepare) }
 }
 
 /// Waits as `zpgs_wait`, and starts the prepared step as soon as the board has ended the one in

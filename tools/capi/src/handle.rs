@@ -1,16 +1,18 @@
 //! The accelerator behind the opaque handle of C, with its step in flight.
 
+use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use pgs_support::Process;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, Impulses,
-    OpenOptions, Prepared, StepParameters, StepReport,
+    LastStep, OpenOptions, Prepared, StepParameters, StepReport,
 };
 
 use crate::failure::Failure;
 use crate::last_error::{self, c_string};
+use crate::memory::CollisionsView;
 use crate::pushed::{List, Pushed};
 use crate::status::Status;
 
@@ -35,6 +37,8 @@ pub(crate) struct State {
     ticket: Option<Detached>,
     prepared: Option<Prepared>,
     pushed: Pushed,
+    /// The last step of each world.
+    last_steps: BTreeMap<u32, LastStep>,
 }
 
 impl AcceleratorHandle {
@@ -45,7 +49,8 @@ impl AcceleratorHandle {
         let cancellation = Cancellation::new();
         accelerator.set_cancellation(cancellation.clone());
         let (ticket, prepared, pushed) = (None, None, Pushed::default());
-        let state = Mutex::new(State { accelerator, ticket, prepared, pushed });
+        let last_steps = BTreeMap::new();
+        let state = Mutex::new(State { accelerator, ticket, prepared, pushed, last_steps });
         Ok(Self { state, cancellation, text: Mutex::default(), process: Process::this() })
     }
 
@@ -109,16 +114,37 @@ impl State {
         }
     }
 
+    /// Takes a step.
+    pub(crate) fn step(
+        &mut self,
+        bodies: &mut impl Bodies,
+        collisions: &CollisionsView<'_>,
+        parameters: &StepParameters,
+    ) -> Result<StepReport, Failure> {
+        self.idle()?;
+        let Self { accelerator, last_steps, .. } = self;
+        placed(last_steps, collisions, |all| Ok(accelerator.step(bodies, all, parameters)?))
+    }
+
     /// Starts a step and keeps its ticket.
     pub(crate) fn submit(
         &mut self,
         bodies: &impl Bodies,
-        collisions: &impl Collisions,
+        collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
-        let step = self.idle()?.submit(bodies, collisions, parameters)?;
-        self.ticket = Some(step.detach());
-        Ok(())
+        self.idle()?;
+        let Self { accelerator, last_steps, ticket, .. } = self;
+        placed(last_steps, collisions, |all| {
+            *ticket = Some(accelerator.submit(bodies, all, parameters)?.detach());
+            Ok(())
+        })
+    }
+
+    /// Keeps the impulses of the last step that gave them out, for the next one of its world.
+    pub(crate) fn commit(&mut self, collisions: &CollisionsView<'_>) -> Result<(), Failure> {
+        let last = self.last_steps.entry(collisions.world).or_default();
+        Ok(last.commit(collisions, self.accelerator.impulses()).map_err(Error::from)?)
     }
 
     /// The list of collisions that are pushed.
@@ -153,13 +179,15 @@ impl State {
     pub(crate) fn prepare(
         &mut self,
         bodies: &impl Bodies,
-        collisions: &impl Collisions,
+        collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
         let ticket = self.ticket()?;
         self.prepared = None;
         let mut step = self.accelerator.attach(ticket)?;
-        let prepared = step.prepare(bodies, collisions, parameters);
+        let prepared = placed(&mut self.last_steps, collisions, |all| {
+            Ok(step.prepare(bodies, all, parameters)?)
+        });
         // The step in flight goes on, whatever became of the other.
         self.ticket = Some(step.detach());
         self.prepared = Some(prepared?);
@@ -197,6 +225,21 @@ impl State {
     pub(crate) fn wait(&mut self, bodies: &mut impl Bodies) -> Result<StepReport, Failure> {
         let ticket = self.ticket()?;
         Ok(self.accelerator.attach(ticket)?.wait(bodies)?)
+    }
+}
+
+/// Hands the collisions over, with the impulses at their places in the last step of their world.
+fn placed<T>(
+    last_steps: &mut BTreeMap<u32, LastStep>,
+    given: &CollisionsView<'_>,
+    take: impl FnOnce(&dyn Collisions) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    match given.places {
+        None => take(given),
+        Some(places) => {
+            let last = last_steps.entry(given.world).or_default();
+            take(&last.placed(given, places, given.factor).map_err(Error::from)?)
+        }
     }
 }
 

@@ -23,7 +23,9 @@ mod shape;
 mod status;
 
 pub use arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
-pub use collision::{Collision, Contact, Impulses, ZPGS_CONTACT_POINTS};
+pub use collision::{
+    Collision, Contact, Impulses, Place, ZPGS_CONTACT_POINTS, ZPGS_NEW_COLLISION, ZPGS_NEW_POINT,
+};
 pub use exports::*;
 pub use exports_ahead::*;
 pub use exports_pushed::*;

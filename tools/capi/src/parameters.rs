@@ -16,17 +16,17 @@ pub enum Order {
     /// As the caller gives them.
     AsGiven = 1,
     /// No hazards, collisions near to their given places.
-    HazardFreeNearby = 2,
-    /// No hazards and few bodies alive.
     HazardFree = 3,
+    /// Far places of the list in turn, for a board with an issue queue.
+    Interleaved = 8,
 }
 
 impl Order {
-    const ALL: [Self; 4] =
-        [Self::Automatic, Self::AsGiven, Self::HazardFreeNearby, Self::HazardFree];
+    const ALL: [Self; 4] = [Self::Automatic, Self::AsGiven, Self::HazardFree, Self::Interleaved];
 
     /// Orders that earlier headers had; their numbers are not given again.
-    const REMOVED: [(u32, &str); 4] = [
+    const REMOVED: [(u32, &str); 5] = [
+        (2, "ZPGS_ORDER_HAZARD_FREE_NEARBY"),
         (4, "ZPGS_ORDER_COLOURS"),
         (5, "ZPGS_ORDER_BODY_BY_BODY_LOWEST_INDEX"),
         (6, "ZPGS_ORDER_BODY_BY_BODY_OLDEST"),
@@ -39,6 +39,9 @@ impl Order {
         let removed = || Self::REMOVED.into_iter().find(|(removed, _)| *removed == number);
         known.ok_or_else(|| {
             Failure::argument(match removed() {
+                Some((2, name)) => format!(
+                    "found {number} as the order: {name} is no more, give ZPGS_ORDER_HAZARD_FREE"
+                ),
                 Some((_, name)) => format!(
                     "found {number} as the order: {name} is no more, give the collisions in this \
                      order and ZPGS_ORDER_AS_GIVEN"
@@ -53,8 +56,8 @@ impl Order {
         match self {
             Self::Automatic => None,
             Self::AsGiven => Some(order::Order::AsGiven),
-            Self::HazardFreeNearby => Some(order::Order::HazardFreeNearby),
             Self::HazardFree => Some(order::Order::HazardFree),
+            Self::Interleaved => Some(order::Order::Interleaved),
         }
     }
 }
@@ -227,12 +230,13 @@ mod tests {
 
     #[test]
     fn an_unknown_order_or_flag_is_refused_by_name() {
-        let order = Parameters { order: 8, ..Parameters::default() }.driver().expect_err("refused");
-        assert!(order.text.contains("found 8 as the order"), "{}", order.text);
+        let order = Parameters { order: 9, ..Parameters::default() }.driver().expect_err("refused");
+        assert!(order.text.contains("found 9 as the order"), "{}", order.text);
         for (order, name) in Order::REMOVED {
             let refused = Parameters { order, ..Parameters::default() }.driver();
             let said = refused.expect_err("removed").text;
-            assert!(said.contains(name) && said.contains("ZPGS_ORDER_AS_GIVEN"), "{said}");
+            let instead = if order == 2 { " give ZPGS_ORDER_HAZARD_FREE" } else { "_AS_GIVEN" };
+            assert!(said.contains(name) && said.ends_with(instead), "{said}");
         }
         let flag = Parameters { kinematic: 2, ..Parameters::default() }.driver();
         assert!(flag.expect_err("refused").text.contains("the flag kinematic"));

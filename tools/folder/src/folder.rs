@@ -13,7 +13,6 @@ use std::collections::HashMap;
 use std::io::{BufWriter, ErrorKind, Read, Write as _};
 use std::path::{Path, PathBuf};
 
-use pgs_support::chunks::Chunks;
 use thiserror::Error;
 use zynq_pgs::scene::CONTACT_POINTS;
 use zynq_pgs::{Body, Collision, Contact, Pose, Shape, StepParameters, Velocity};
@@ -143,7 +142,7 @@ fn rows<T: Element, const N: usize>(
 }
 
 fn as_rows<T: Element, const N: usize>(elements: &[T]) -> Vec<[T; N]> {
-    let (rows, rest) = elements.split_arrays();
+    let (rows, rest) = elements.as_chunks();
     debug_assert!(rest.is_empty(), "the shape was checked");
     rows.to_vec()
 }
@@ -203,7 +202,7 @@ impl Folder {
         let shape = Dimensions(vec![m, Some(CONTACT_POINTS), Some(4)]);
         let (_, points) = array(COLLISION_POINTS, shape)?;
         let points: Vec<[f32; 4]> = as_rows(&points);
-        let contacts = points.split_arrays::<CONTACT_POINTS>().0;
+        let contacts = points.as_chunks::<CONTACT_POINTS>().0;
         let collisions = (0..pairs.len())
             .map(|k| Collision {
                 body_a: pairs[k][0],

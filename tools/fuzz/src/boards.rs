@@ -17,6 +17,7 @@ pub fn any(input: &mut Input<'_>) -> BoardConfig {
         numbers: Some(numbers),
         inertia,
         hazards: if on(0) { Hazards::Unchecked } else { Hazards::Interlocked },
+        queue: profile.queue.filter(|_| !on(0)).map(|_| input.pick(&[0, 1, 3, 64])),
         // In the profiles' own windows, an order without hazards needs hundreds of empty entries.
         window_slots: if on(1) && on(4) { None } else { Some(1 + input.below(24)) },
         bandwidth: input.pick(&[

@@ -39,6 +39,7 @@ mod poses;
 mod rotation;
 mod shapes;
 mod spheres;
+mod warm_start;
 
 pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
 pub use detect::{DetectionTimes, MARGIN};
@@ -55,6 +56,7 @@ pub use measure::{
 pub use pgs_support::random::SplitMix64;
 pub use shapes::{SHAPE_FRICTIONS, ShapesOptions};
 pub use spheres::{RADII, SPHERES_MAX, Spheres};
+pub use warm_start::WarmStart;
 
 /// Index of the static ground among the bodies.
 pub const GROUND: u32 = 0;

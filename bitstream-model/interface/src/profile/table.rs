@@ -50,9 +50,9 @@ pub const NAIVE: Profile = Profile {
         Stripe { streams: &[0], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0], padded: false }),
+    queue: None,
     initiation_interval: 28,
     collisions_per_issue: 1,
-    queue: None,
     contact: CONTACT,
     friction: FRICTION,
     world: None,
@@ -77,9 +77,9 @@ pub const FLOAT: Profile = Profile {
         Stripe { streams: &[0, 1, 2, 3], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
+    queue: Some(64),
     initiation_interval: 2,
     collisions_per_issue: 1,
-    queue: Some(0),
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
     world: Some([FLOAT_WORLD_CONTACT, FLOAT_WORLD_FRICTION]),
@@ -107,17 +107,11 @@ pub const HALF: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0, 0, 0, 1, 1, 1, 2, 2], padded: true }),
     initiation_interval: 3,
     collisions_per_issue: 2,
-    queue: None,
-    contact: CONTACT,
-    friction: FRICTION,
-    world: None,
-    integration_fill: INTEGRATION_FILL,
-    flushes_subnormals: false,
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },
-    body_capacity: 131_072,
-    shape_capacity: 64,
     source: "thesis §5.5, §4.4.2",
+    // The pipelines, no queue, the capacities, and that subnormal numbers count.
+    ..NAIVE
 };
 
 /// Every profile.

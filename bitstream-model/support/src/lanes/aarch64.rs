@@ -39,16 +39,6 @@ impl<const BINARY16: bool> Instructions for Neon<BINARY16> {
 
     type Register = float32x4_t;
 
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
-
     by_instructions! {
         add(a, b) vaddq_f32;
         sub(a, b) vsubq_f32;

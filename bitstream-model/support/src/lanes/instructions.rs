@@ -27,13 +27,19 @@ pub trait Instructions: Copy + Debug {
     const BINARY16: bool;
 
     /// A number in each lane.
-    type Register: Copy;
+    type Register: bytemuck::Pod;
 
     /// The numbers of an array.
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register;
+    #[inline(always)]
+    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
+        bytemuck::cast(*numbers)
+    }
 
     /// The array of the numbers.
-    fn store(self, numbers: Self::Register) -> [f32; LANES];
+    #[inline(always)]
+    fn store(self, numbers: Self::Register) -> [f32; LANES] {
+        bytemuck::cast(numbers)
+    }
 
     /// The same number in each lane.
     #[inline(always)]
@@ -248,16 +254,6 @@ impl<const BINARY16: bool> Instructions for Target<BINARY16> {
     const BINARY16: bool = BINARY16;
 
     type Register = [f32; LANES];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> [f32; LANES] {
-        *numbers
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: [f32; LANES]) -> [f32; LANES] {
-        numbers
-    }
 }
 
 /// Prefetches a value into the cache, on processors with such an instruction. The address may be

@@ -136,16 +136,6 @@ impl<const BINARY16: bool> Instructions for Avx2<BINARY16> {
 
     type Register = [__m256; 2];
 
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
-
     by_instructions! {
         add(a, b) _mm256_add_ps;
         sub(a, b) _mm256_sub_ps;
@@ -331,16 +321,6 @@ impl<const BINARY16: bool> Instructions for Avx512<BINARY16> {
     const BINARY16: bool = BINARY16;
 
     type Register = [__m512; 1];
-
-    #[inline(always)]
-    fn load(self, numbers: &[f32; LANES]) -> Self::Register {
-        bytemuck::cast(*numbers)
-    }
-
-    #[inline(always)]
-    fn store(self, numbers: Self::Register) -> [f32; LANES] {
-        bytemuck::cast(numbers)
-    }
 
     by_instructions! {
         add(a, b) _mm512_add_ps;

@@ -18,7 +18,6 @@ use std::time::Duration;
 
 use pgs_interface::axi_dma::dmasr;
 use pgs_interface::descriptor::{self, status};
-use pgs_support::chunks::Chunks;
 
 use crate::axi_dma::{
     Channel, Descriptor, Direction, DmaError, Dmacr, Dmasr, Progress, Ring, pieces, reset_core,
@@ -75,7 +74,7 @@ impl Core {
             CpuBuffer::allocate(&self.platform, beats, ADDRESS_WIDTH.into()).expect("memory");
         let mut padded = bytes.to_vec();
         padded.resize(16 * beats, 0);
-        let (words, _) = padded.split_arrays::<4>();
+        let (words, _) = padded.as_chunks::<4>();
         let there = buffer.beats_mut().iter_mut().flat_map(|beat| &mut beat.0);
         for (word, bytes) in there.zip(words) {
             *word = u32::from_le_bytes(*bytes);

@@ -15,7 +15,6 @@ use std::time::{Duration, Instant};
 
 use pgs_interface::axi_dma::{DMACR, S2MM_OFFSET, dmacr};
 use pgs_interface::record::{BEAT_BYTES, Beat};
-use pgs_support::chunks::Chunks;
 
 use super::machine::Machine;
 use crate::platform::{
@@ -149,7 +148,7 @@ impl Board {
     fn fetch(&mut self) {
         for (address, shared) in &mut self.shared {
             let bytes = self.machine.read(*address, 4 * shared.there.len());
-            let (words, _) = bytes.split_arrays::<4>();
+            let (words, _) = bytes.as_chunks::<4>();
             for ((here, there), now) in shared.words.iter().zip(&mut shared.there).zip(words) {
                 let now = u32::from_le_bytes(*now);
                 if now != *there {
@@ -233,7 +232,7 @@ impl DmaMemorySource for QtestPlatform {
         let (mut memory, access) = board.with_device.remove(&address).expect("handed over before");
         if access == Access::Write {
             let bytes = board.machine.read(address, memory.beats().len() * BEAT_BYTES);
-            let (words, _) = bytes.split_arrays::<4>();
+            let (words, _) = bytes.as_chunks::<4>();
             let here = memory.beats_mut().iter_mut().flat_map(|beat| &mut beat.0);
             for (word, now) in here.zip(words) {
                 *word = u32::from_le_bytes(*now);

@@ -28,7 +28,7 @@ pub(crate) fn measure(options: &Options) -> Outcome {
         return Ok(());
     }
     let (instructions, _, packed) =
-        count(options, Only::Pack, "*zynq_pgs::bench::CollisionPacker*pack*")?;
+        count(options, Only::Pack, "zynq_pgs::beat::collisions::CollisionPacker::write*")?;
     let each = instructions / packed;
     let step = options.step()?;
     let report = Emulated::new(&step, BoardConfig::default())?.take()?;

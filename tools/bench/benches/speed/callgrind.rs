@@ -2,7 +2,6 @@
 //! and runs a single item for tools that count.
 
 use std::error::Error;
-use std::hint::black_box;
 use std::process::Command;
 
 use bench::step::{Emulated, Step};
@@ -11,7 +10,7 @@ use bitstream_model::interface::profile::{FLOAT, Profile};
 use clap::ValueEnum;
 use yardstick::Yardstick;
 use zynq_pgs::StepParameters;
-use zynq_pgs::bench::CollisionPacker;
+use zynq_pgs::bench::StepPacker;
 
 use crate::{Options, Outcome};
 
@@ -36,7 +35,7 @@ const GRID: &str = "10x10x10";
 pub(crate) enum Only {
     /// Solve the step with the yardstick
     Yardstick,
-    /// Pack its collisions, as they are given
+    /// Pack the step, its collisions as they are given
     Pack,
     /// Take the step on the emulated board of a profile
     Emulated,
@@ -51,8 +50,12 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
             Yardstick::new(shapes, bodies, &in_order, parameters).solve();
         }
         (Only::Pack, None) => {
-            let mut packer = CollisionPacker::new(FLOAT.default_variant());
-            black_box(packer.pack(&step.bodies, &step.collisions, &step.shapes));
+            let mut packer = StepPacker::new(FLOAT.default_variant(), Some(1));
+            let parameters = StepParameters::default();
+            let with = (None, &parameters);
+            packer
+                .pack(&step.bodies, &step.collisions, &step.shapes, with)?
+                .ok_or("the step is refused")?;
         }
         (Only::Emulated, Some(profile)) => {
             let profile = Profile::by_name(profile).ok_or("--profile: no profile has this name")?;

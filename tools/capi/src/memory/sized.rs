@@ -51,12 +51,13 @@ unsafe impl Growing for BodyArrays {
 }
 const _: () = assert!(size_of::<BodyArrays>() == 12 * size_of::<usize>());
 
-// SAFETY: `repr(C)`, two `usize` and two pairs of a raw pointer and a `usize`.
+// SAFETY: `repr(C)`, two `usize`, two pairs of a raw pointer and a `usize`, a raw pointer and two
+// numbers of 32 bits.
 unsafe impl Growing for CollisionArray {
     const NAME: &'static str = "zpgs_collisions";
     const FIRST: usize = offset_of!(Self, impulses);
 }
-const _: () = assert!(size_of::<CollisionArray>() == 6 * size_of::<usize>());
+const _: () = assert!(size_of::<CollisionArray>() == 7 * size_of::<usize>() + 2 * 4);
 
 /// Checks the size that a caller gives.
 fn check_size<T: Growing>(size: usize) -> Result<(), Failure> {

@@ -1,13 +1,12 @@
 //! Views of the caller's arrays that the driver takes as bodies and collisions.
 
 use std::ptr::NonNull;
-use std::slice;
 
 use zynq_pgs::scene::Structures;
-use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Pose, Velocity};
+use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Place, Pose, Velocity};
 
 use super::overlap::Span;
-use super::pointer::{extent, misaligned};
+use super::pointer::{extent, misaligned, slice};
 use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
 use crate::failure::Failure;
 
@@ -200,6 +199,9 @@ pub(crate) struct CollisionsView<'a> {
     /// All of them, where they lie without gaps.
     dense: Option<&'a [Collision]>,
     impulses: Option<Column<Impulses>>,
+    pub(crate) places: Option<&'a [Place]>,
+    pub(crate) factor: f32,
+    pub(crate) world: u32,
 }
 
 impl CollisionsView<'_> {
@@ -209,13 +211,13 @@ impl CollisionsView<'_> {
     /// The arrays are as [`CollisionArray`] describes, initialised, and live as long as the view is
     /// in use. Nothing writes them meanwhile.
     pub(crate) unsafe fn new(array: CollisionArray) -> Result<Self, Failure> {
-        let CollisionArray { count, collisions, impulses, .. } = array;
+        let CollisionArray { count, collisions, impulses, places, factor, world, .. } = array;
         // SAFETY: the caller promises the array; a `Collision` takes every bit pattern.
         let column = unsafe { Column::new(collisions, count, "collisions") }?;
         let dense = if column.stride == size_of::<Collision>() || count == 0 {
             // SAFETY: `count` elements without gaps, aligned and within the address space (the
             // invariant of the column), which nothing writes.
-            Some(unsafe { slice::from_raw_parts(column.first.as_ptr(), count) })
+            Some(unsafe { std::slice::from_raw_parts(column.first.as_ptr(), count) })
         } else {
             None
         };
@@ -224,19 +226,32 @@ impl CollisionsView<'_> {
             // SAFETY: the caller promises the array; floats take every bit pattern.
             false => Some(unsafe { Column::new(impulses, count, "impulses") }?),
         };
-        Ok(Self { count, column, dense, impulses })
+        let places = match places.is_null() {
+            true => None,
+            // SAFETY: the caller promises the array; integers take every bit pattern.
+            false => Some(unsafe { slice(places.cast::<Place>(), count, "places") }?),
+        };
+        if impulses.is_some() && places.is_some() {
+            return Err(Failure::argument(
+                "zpgs_collisions has impulses and places: set one of them to null".to_owned(),
+            ));
+        }
+        Ok(Self { count, column, dense, impulses, places, factor, world })
     }
 
     /// The arrays.
-    pub(crate) fn inputs(&self) -> [Span; 2] {
+    pub(crate) fn inputs(&self) -> [Span; 3] {
         let none = || Span::of::<Impulses>("impulses", std::ptr::null());
         let impulses = self.impulses.as_ref().map_or_else(none, |column| column.span(self.count));
-        [self.column.span(self.count), impulses]
+        let places = self.places.unwrap_or_default();
+        let places =
+            Span::new::<Place>("places", places.as_ptr().addr(), size_of::<Place>(), places.len());
+        [self.column.span(self.count), impulses, places]
     }
 
     /// Whether a step can begin with the impulses of every collision.
     pub(crate) fn has_impulses(&self) -> bool {
-        self.impulses.is_some() || self.count == 0
+        self.impulses.is_some() || self.places.is_some() || self.count == 0
     }
 }
 
@@ -348,6 +363,9 @@ mod tests {
                 stride: times * size_of::<Collision>(),
             },
             impulses: StridedConst { data: std::ptr::null(), stride: 0 },
+            places: std::ptr::null(),
+            factor: 0.0,
+            world: 0,
         };
         // SAFETY: four elements.
         let dense = unsafe { CollisionsView::new(array(4, 1)) }.expect("an array");

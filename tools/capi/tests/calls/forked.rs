@@ -8,7 +8,7 @@ use zynq_pgs_c::*;
 use crate::support::*;
 
 /// The calls of a child with its parent's accelerator, and their statuses.
-fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 13] {
+fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 14] {
     let all = [collision()];
     let (bodies, given, parameters) = (arrays(crates), collisions(&all), defaults());
     let (b, c, p) = (from_ref(&bodies), from_ref(&given), from_ref(&parameters));
@@ -24,6 +24,7 @@ fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 13] {
         made!(zpgs_push(handle, all.as_ptr(), null(), 1)),
         made!(zpgs_end(handle, b, p)),
         made!(zpgs_read_impulses(handle, none, 0)),
+        made!(zpgs_commit(handle, c)),
         made!(zpgs_set_shapes(handle, SHAPES.as_ptr(), SHAPES.len())),
         made!(zpgs_cancel(handle)),
         made!(zpgs_step(handle, null(), null(), null(), null_mut())),
@@ -38,7 +39,7 @@ fn a_forked_child_is_refused_and_closes_and_the_parents_step_goes_on() {
     let parent = std::process::id().to_string();
     let in_child = || {
         let mut crates = world();
-        if statuses(&open, &mut crates) != [Status::Forked; 13] || crates != world() {
+        if statuses(&open, &mut crates) != [Status::Forked; 14] || crates != world() {
             return 1;
         }
         let text = open.text();

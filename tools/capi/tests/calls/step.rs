@@ -1,7 +1,7 @@
 //! A step through the C interface has the bits of the driver.
 
 use std::ffi::c_void;
-use std::ptr::{from_ref, null_mut};
+use std::ptr::{from_ref, null, null_mut};
 
 use zynq_pgs::{Accelerator, Body, OpenOptions, Pose, StepParameters, Velocity};
 use zynq_pgs_c::*;
@@ -105,6 +105,44 @@ fn impulses_go_in_and_come_out_at_their_strides() {
     let status = open.step(&arrays(&mut crates), &collisions(&all), &parameters);
     assert_eq!(status, Status::Argument);
     assert!(open.text().contains("a warm start without impulses"), "{}", open.text());
+}
+
+#[test]
+fn impulses_come_by_place_from_the_step_that_was_committed() {
+    let (open, mut crates, all) = (Open::new("emulated:float"), world(), [collision()]);
+    let parameters = Parameters { warm_start: 1, impulses_out: 1, ..defaults() };
+    let driver = StepParameters::default().with_warm_start(true).with_impulses_out(true);
+    let place = |collision, point| [Place { collision, points: [point; ZPGS_CONTACT_POINTS] }];
+    let same = [Place { collision: 0, points: [0, 1, 2, 3] }];
+    let given = |places: &[Place; 1], world| {
+        let impulses = StridedConst { data: null(), stride: 0 };
+        CollisionArray { impulses, places: places.as_ptr(), factor: 1.0, world, ..collisions(&all) }
+    };
+    let new = place(ZPGS_NEW_COLLISION, ZPGS_NEW_POINT);
+    assert_eq!(open.step(&arrays(&mut crates), &given(&same, 7), &parameters), Status::Input);
+    assert!(open.text().contains("that step had 0 collisions"), "{}", open.text());
+    let mut out = [Impulses::default()];
+    for (places, expected) in [&new, &same].into_iter().zip(warm_steps(&driver)) {
+        let all = given(places, 7);
+        let status = open.step(&arrays(&mut crates), &all, &parameters);
+        assert_eq!(status, Status::Ok, "{}", open.text());
+        let into = Strided { data: out.as_mut_ptr().cast(), stride: size_of::<Impulses>() };
+        assert_eq!(made!(zpgs_read_impulses(open.0, into, 1)), Status::Ok, "{}", open.text());
+        assert_eq!((out[0].normal, out[0].friction), (expected.normal, expected.friction));
+        assert_eq!(made!(zpgs_commit(open.0, &raw const all)), Status::Ok, "{}", open.text());
+    }
+    // Another world has another last step.
+    assert_eq!(open.step(&arrays(&mut crates), &given(&same, 8), &parameters), Status::Input);
+    let wrong = place(0, 4);
+    assert_eq!(open.step(&arrays(&mut crates), &given(&wrong, 7), &parameters), Status::Input);
+    assert!(open.text().contains("contact point 0"), "{}", open.text());
+    let none = CollisionArray { count: 0, ..given(&same, 7) };
+    assert_eq!(made!(zpgs_commit(open.0, &raw const none)), Status::Input);
+    assert!(open.text().contains("found 1 impulses of 0 collisions"), "{}", open.text());
+    let mut both = given(&same, 7);
+    both.impulses = StridedConst { data: out.as_ptr().cast(), stride: size_of::<Impulses>() };
+    assert_eq!(open.step(&arrays(&mut crates), &both, &parameters), Status::Argument);
+    assert!(open.text().contains("set one of them to null"), "{}", open.text());
 }
 
 #[test]

@@ -71,6 +71,9 @@ pub(crate) fn collisions(all: &[Collision]) -> CollisionArray {
         count: all.len(),
         collisions: StridedConst { data: all.as_ptr().cast(), stride: size_of::<Collision>() },
         impulses: StridedConst { data: null(), stride: 0 },
+        places: null(),
+        factor: 0.0,
+        world: 0,
     }
 }
 

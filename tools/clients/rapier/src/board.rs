@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use rapier3d::prelude::*;
 use zynq_pgs::{
-    Accelerator, Body, Collision, Contact, ContactMemory, OpenOptions, StepParameters, StepReport,
-    WarmCollisions,
+    Accelerator, Body, Collision, Contact, LastStep, OpenOptions, Place, StepParameters, StepReport,
 };
 
 use crate::reduce::{Point, reduced};
@@ -26,6 +25,9 @@ const POINTS: usize = 2;
 /// A pass favours its last collisions, and a tower would lean to one side.
 const REVERSE_EVERY: u32 = 3;
 
+/// A collision in every step: two colliders, one of their manifolds, one of its groups of points.
+type Part = (ColliderHandle, ColliderHandle, usize, usize);
+
 /// An accelerator, and the bodies of a world in its layout.
 pub(crate) struct Board {
     accelerator: Accelerator,
@@ -36,7 +38,12 @@ pub(crate) struct Board {
     handles: Vec<RigidBodyHandle>,
     index: HashMap<RigidBodyHandle, u32>,
     collisions: Vec<Collision>,
-    memory: ContactMemory,
+    /// Parallel to `collisions`.
+    parts: Vec<Part>,
+    last: LastStep,
+    /// The collisions of the last step, and their numbers.
+    before: Vec<Collision>,
+    numbers: HashMap<Part, u32>,
     steps: u32,
     report: Option<StepReport>,
 }
@@ -87,7 +94,10 @@ impl Board {
             handles,
             index,
             collisions: Vec::new(),
-            memory: ContactMemory::new(REACH),
+            parts: Vec::new(),
+            last: LastStep::default(),
+            before: Vec::new(),
+            numbers: HashMap::new(),
             steps: 0,
             report: None,
         })
@@ -114,19 +124,34 @@ impl Board {
         self.steps += 1;
         if self.steps.is_multiple_of(REVERSE_EVERY) {
             self.collisions.reverse();
+            self.parts.reverse();
         }
-        let impulses = self.memory.recall(&self.collisions, KEPT_IMPULSES);
-        let warm = WarmCollisions { collisions: &self.collisions, impulses: &impulses };
-        let report = self.accelerator.step(&mut self.bodies, &warm, &self.parameters)?;
+        let places = self.places();
+        let placed = self.last.placed(&self.collisions, &places, KEPT_IMPULSES)?;
+        let report = self.accelerator.step(&mut self.bodies, &placed, &self.parameters)?;
         self.report = Some(report);
-        self.memory.remember(&self.collisions, self.accelerator.impulses());
+        self.last.commit(&self.collisions, self.accelerator.impulses())?;
+        std::mem::swap(&mut self.before, &mut self.collisions);
+        self.numbers = self.parts.iter().copied().zip(0..).collect();
         self.scatter(sets);
         Ok(())
+    }
+
+    /// The place of each collision in the last step.
+    fn places(&self) -> Vec<Place> {
+        let place = |(new, part): (&Collision, &Part)| {
+            let number = *self.numbers.get(part)?;
+            let old = self.before.get(number as usize)?;
+            Some(Place::nearest(number, old, new, REACH))
+        };
+        let all = self.collisions.iter().zip(&self.parts);
+        all.map(|both| place(both).unwrap_or(Place::NEW)).collect()
     }
 
     /// Makes the collisions of the step.
     fn gather(&mut self, sets: &Sets) {
         self.collisions.clear();
+        self.parts.clear();
         for pair in sets.narrow_phase.contact_pairs() {
             // Rapier's normal points from its first body to its second, the board's from B to A.
             let colliders = [pair.collider1, pair.collider2].map(|at| sets.colliders.get(at));
@@ -135,7 +160,7 @@ impl Board {
                 collider.parent().and_then(|handle| self.index.get(&handle).copied())
             };
             let (Some(body_b), Some(body_a)) = (index_of(of_b), index_of(of_a)) else { continue };
-            for manifold in pair.manifolds() {
+            for (number, manifold) in pair.manifolds().iter().enumerate() {
                 let place = match manifold.subshape_pos1() {
                     Some(part) => *of_b.position() * *part,
                     None => *of_b.position(),
@@ -145,7 +170,7 @@ impl Board {
                     .iter()
                     .map(|point| Point { place: place * point.local_p1, distance: point.dist });
                 let normal = manifold.data.normal.to_array();
-                for some in reduced(points.collect()).chunks(POINTS) {
+                for (group, some) in reduced(points.collect()).chunks(POINTS).enumerate() {
                     let mut contacts = [Contact::default(); 4];
                     for (to, from) in contacts.iter_mut().zip(some) {
                         let (point, distance) =
@@ -155,6 +180,7 @@ impl Board {
                     let count = some.len() as u32;
                     let collision = Collision { body_a, body_b, normal, count, contacts };
                     self.collisions.push(collision.with_friction(manifold.data.friction));
+                    self.parts.push((pair.collider1, pair.collider2, number, group));
                 }
             }
         }

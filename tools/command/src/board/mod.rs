@@ -371,6 +371,10 @@ impl OpenBoard {
             can.initiation_interval,
             hazards_text(can.interlocked),
         );
+        let bitstream = match can.queue {
+            0 => bitstream,
+            depth => format!("{bitstream}, queue {depth}"),
+        };
         fact(out, "bitstream", &bitstream)?;
         let Some(config) = self.config() else { return Ok(()) };
         let window = match config.window_slots {
@@ -395,6 +399,7 @@ impl OpenBoard {
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
             "interlocked": can.interlocked,
+            "queue": can.queue,
             "mm2s_channels": can.mm2s_channels,
             "s2mm_channels": can.s2mm_channels,
             "initiation_interval": can.initiation_interval,

@@ -19,15 +19,15 @@ pub struct OrderingArgs {
 /// An order of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OrderName {
-    /// Fewest cycles on the board: hazard-free-nearby (without empty entries if the pipeline waits
-    /// on hazards), or as-given if it takes fewer cycles
+    /// Fewest cycles on the board: interleaved if it has an issue queue; else hazard-free (without
+    /// empty entries if the pipeline waits on hazards), or as-given if it takes fewer cycles
     Auto,
-    /// As detected, which is Bullet's order: many hazards
+    /// As detected, which is Bullet's order, past the issue queue: many hazards
     AsGiven,
-    /// No hazards, few bodies alive, few empty entries
+    /// Far places of the list in turn, for an issue queue: few hazards, and no work for the host
+    Interleaved,
+    /// No hazards, near the order as given, few empty entries
     HazardFree,
-    /// No hazards, near the order as given, few empty entries (otherwise falls back to hazard-free)
-    HazardFreeNearby,
 }
 
 impl OrderName {
@@ -36,8 +36,8 @@ impl OrderName {
         match self {
             Self::Auto => None,
             Self::AsGiven => Some(Order::AsGiven),
+            Self::Interleaved => Some(Order::Interleaved),
             Self::HazardFree => Some(Order::HazardFree),
-            Self::HazardFreeNearby => Some(Order::HazardFreeNearby),
         }
     }
 

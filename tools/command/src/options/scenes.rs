@@ -14,9 +14,6 @@ use zynq_pgs::emulation::Build;
 use crate::failure::{Failure, Result};
 use crate::numbers::grouped;
 
-/// A contact of a scene that has moved further than this from one step to the next is a new one, m.
-pub const CONTACT_REACH: f32 = 0.05;
-
 /// Default steps of `pgs run` for cubes, and for shapes.
 pub const STEPS: [u32; 2] = [120, 600];
 

@@ -12,14 +12,16 @@ use crate::options::ordering::{is_sequential, name};
 /// comparison fails all the same.
 pub fn beside_bullet(report: &StepReport, capabilities: &Capabilities) -> Option<&'static str> {
     match report.order {
-        Order::AsGiven if is_sequential(capabilities) => Some("Bullet's own, to compare with it"),
-        Order::AsGiven => None,
+        Order::AsGiven if is_sequential(capabilities) && !report.queued => {
+            Some("Bullet's own, to compare with it")
+        }
+        Order::AsGiven if !report.queued => None,
         _ => Some("not Bullet's: results differ by the order alone"),
     }
 }
 
-/// The orders of a run's steps, and the number of steps in each: one order may fall back to another
-/// ([`Order::HazardFreeNearby`]).
+/// The orders of a run's steps, and the number of steps in each: a board without a queue may take
+/// one step as given and the next one reordered.
 #[derive(Debug, Default)]
 pub struct OrdersSent(Vec<(Order, u64)>);
 
@@ -54,6 +56,7 @@ pub fn with_reason(report: &StepReport) -> String {
 pub fn reason(report: &StepReport) -> Option<String> {
     let OrderChoice::Cheapest(costs) = report.order_choice else {
         return match report.order_choice {
+            OrderChoice::Queue => Some("this board's issue queue keeps hazards apart".to_owned()),
             OrderChoice::NoInterlock => Some("this board does not wait on hazards".to_owned()),
             _ => None,
         };
@@ -61,8 +64,8 @@ pub fn reason(report: &StepReport) -> Option<String> {
     let as_given = grouped(costs.as_given);
     Some(match costs.reordered.map(|cycles| (grouped(cycles), cycles < costs.as_given)) {
         Some((reordered, true)) => format!(
-            "this board waits on hazards; the passes take at most {reordered} cycles, as given \
-             they take more than {as_given}"
+            "this board waits on hazards; the passes take {reordered} cycles, as given they \
+             take more than {as_given}"
         ),
         Some((reordered, false)) => format!(
             "this board waits on hazards; the passes take {as_given} cycles, {reordered} without \
@@ -79,13 +82,8 @@ pub fn text(report: &StepReport) -> String {
         let share = report.empty as f64 / (report.collisions as f64).max(1.0);
         text += &format!(", {} empty entries ({:.2} %)", grouped(report.empty), share * 100.0);
     }
-    if let Some(verified) = &report.verified {
-        text += &format!(
-            ", verified: {} hazards, {} bodies alive at most, longest span {} slots",
-            verified.hazards,
-            grouped(verified.most_alive as u64),
-            grouped(verified.longest_span as u64),
-        );
+    if report.verified {
+        text += ", verified: no hazards";
     }
     text
 }
@@ -96,13 +94,8 @@ pub fn to_json(report: &StepReport) -> Value {
         "name": name(report.order),
         "choice": choice_json(&report.order_choice),
         "empty": report.empty,
-        "verified": report.verified.map(|verified| json!({
-            "hazards": verified.hazards,
-            "lost_updates": verified.lost_updates,
-            "most_alive": verified.most_alive,
-            "longest_span": verified.longest_span,
-            "mean_span": verified.mean_span,
-        })),
+        "queued": report.queued,
+        "verified": report.verified,
     })
 }
 
@@ -110,6 +103,7 @@ pub fn to_json(report: &StepReport) -> Value {
 fn choice_json(choice: &OrderChoice) -> Value {
     let name = match choice {
         OrderChoice::Asked => "asked",
+        OrderChoice::Queue => "queue",
         OrderChoice::NoInterlock => "no_interlock",
         OrderChoice::Cheapest(_) => "cheapest",
         _ => "other",

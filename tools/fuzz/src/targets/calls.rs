@@ -6,10 +6,11 @@ use std::ffi::CStr;
 use std::ptr;
 
 use zynq_pgs_c::{
-    AcceleratorHandle, BodyArrays, Collision, CollisionArray, Impulses, Parameters, Report, Shape,
-    Status, Strided, StridedConst, zpgs_begin, zpgs_cancel, zpgs_close, zpgs_end, zpgs_last_error,
-    zpgs_open, zpgs_prepare, zpgs_push, zpgs_read_impulses, zpgs_set_shapes, zpgs_start, zpgs_step,
-    zpgs_submit, zpgs_wait, zpgs_wait_and_start,
+    AcceleratorHandle, BodyArrays, Collision, CollisionArray, Impulses, Parameters, Place, Report,
+    Shape, Status, Strided, StridedConst, ZPGS_NEW_COLLISION, ZPGS_NEW_POINT, zpgs_begin,
+    zpgs_cancel, zpgs_close, zpgs_commit, zpgs_end, zpgs_last_error, zpgs_open, zpgs_prepare,
+    zpgs_push, zpgs_read_impulses, zpgs_set_shapes, zpgs_start, zpgs_step, zpgs_submit, zpgs_wait,
+    zpgs_wait_and_start,
 };
 
 use crate::input::Input;
@@ -158,6 +159,8 @@ impl Bodies {
 struct Collisions {
     elements: Column,
     impulses: Column,
+    /// They stay where they are: the structure has their address.
+    _places: Vec<Place>,
     structure: Sized,
 }
 
@@ -175,19 +178,33 @@ impl Collisions {
             words
         });
         let mut impulses = Column::any(input, count, |_, _| [0; size_of::<Impulses>() / 4]);
+        let by_place = input.one_in(4);
+        let places: Vec<Place> = (0..count).map(|_| place(input)).collect();
+        let nothing = StridedConst { data: ptr::null(), stride: 0 };
         let array = CollisionArray {
             size: 0,
             count,
             collisions: elements.constant(),
-            impulses: impulses.constant(),
+            impulses: if by_place { nothing } else { impulses.constant() },
+            places: if by_place || input.one_in(64) { places.as_ptr() } else { ptr::null() },
+            factor: if input.one_in(64) { f32::from_bits(input.word()) } else { 0.85 },
+            world: input.below(2),
         };
-        Self { elements, impulses, structure: Sized::any(input, array) }
+        Self { elements, impulses, _places: places, structure: Sized::any(input, array) }
     }
 
     fn check(&self) {
         self.elements.check(false);
         self.impulses.check(false);
     }
+}
+
+/// The place of a collision, mostly one that some steps have.
+fn place(input: &mut Input<'_>) -> Place {
+    let mut point = || if input.one_in(8) { input.byte() } else { ZPGS_NEW_POINT };
+    let points = [point(), 1, point(), 3];
+    let old = !input.one_in(3);
+    Place { collision: if old { input.below(4) } else { ZPGS_NEW_COLLISION }, points }
 }
 
 fn parameters(input: &mut Input<'_>) -> Sized {
@@ -250,7 +267,7 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
     let (given, wanted) = (bodies.structure.pointer(), collisions.structure.pointer());
     let (steps, told) = (parameters.pointer(), report.pointer::<Report>());
     let mut started = Status::Ok;
-    let choice = input.below(12);
+    let choice = input.below(13);
     let status = match choice {
         // `run` has opened the handle, and this thread alone uses it. A `Sized` has room for the
         // largest structure that the interface takes, and a `Column` for every element at its
@@ -286,6 +303,8 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
         }
         // SAFETY: the handle is open.
         10 if input.one_in(4) => unsafe { zpgs_cancel(handle) },
+        // SAFETY: the handle is open; collisions have room.
+        12 => unsafe { zpgs_commit(handle, wanted) },
         // SAFETY: the handle is open; bodies, collisions, parameters and report have room.
         _ => unsafe { zpgs_step(handle, given, wanted, steps, told) },
     };

@@ -1,7 +1,6 @@
 //! Keeps bodies and collisions in one array of numbers each, as an engine with records of its own
 //! does: fields anywhere in a record, and words between them that must not change.
 
-use pgs_support::chunks::Chunks;
 use zynq_pgs::scene::CONTACT_POINTS;
 use zynq_pgs::{Bodies, Body, Collision, Collisions, Contact, Pose, Velocity};
 
@@ -135,7 +134,7 @@ impl Collisions for StridedCollisions {
         let fields: [f32; COLLISION] = self.records.fields(index);
         let (normal, points) = fields.split_at(3);
         let mut contacts = [Contact::default(); CONTACT_POINTS];
-        for (contact, numbers) in contacts.iter_mut().zip(points.split_arrays().0) {
+        for (contact, numbers) in contacts.iter_mut().zip(points.as_chunks().0) {
             let [x, y, z, distance] = *numbers;
             *contact = Contact { point: [x, y, z], distance };
         }

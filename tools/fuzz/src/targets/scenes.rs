@@ -237,7 +237,7 @@ pub(super) fn parameters(
         parameters.impulses_out = wanted & 8 == 8;
     }
     if switches & 12 == 12 {
-        let orders = [Order::AsGiven, Order::HazardFree, Order::HazardFreeNearby];
+        let orders = [Order::AsGiven, Order::HazardFree, Order::Interleaved];
         parameters.order = Some(input.pick(&orders));
     }
     if invalid == InvalidValues::Sometimes && input.one_in(100) {

@@ -10,8 +10,7 @@ use std::os::unix::fs::FileExt as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use bitstream_model::DeviceMemory;
-use bitstream_model::interface::record::Beat;
+use bitstream_model::ByteMemory;
 
 use crate::mailbox::Words;
 
@@ -54,6 +53,14 @@ impl GuestFile {
         Err(io::Error::new(io::ErrorKind::InvalidInput, text))
     }
 
+    fn load(&self, address: u64) -> io::Result<u32> {
+        let mut bytes = [0; 4];
+        self.read(address, &mut bytes)?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+}
+
+impl ByteMemory for GuestFile {
     fn read(&self, address: u64, to: &mut [u8]) -> io::Result<()> {
         self.check(address, to.len())?;
         self.file.read_exact_at(to, address)
@@ -62,37 +69,6 @@ impl GuestFile {
     fn write(&self, address: u64, from: &[u8]) -> io::Result<()> {
         self.check(address, from.len())?;
         self.file.write_all_at(from, address)
-    }
-
-    fn load(&self, address: u64) -> io::Result<u32> {
-        let mut bytes = [0; 4];
-        self.read(address, &mut bytes)?;
-        Ok(u32::from_le_bytes(bytes))
-    }
-
-    /// Writes the uppermost byte last: it holds the flags that complete a descriptor.
-    fn store(&self, address: u64, value: u32) -> io::Result<()> {
-        let bytes = value.to_le_bytes();
-        self.write(address, &bytes[..3])?;
-        self.write(address + 3, &bytes[3..])
-    }
-}
-
-impl DeviceMemory for GuestFile {
-    fn read_beats(&mut self, address: u64, to: &mut [Beat]) -> io::Result<()> {
-        self.read(address, bytemuck::cast_slice_mut(to))
-    }
-
-    fn write_beats(&mut self, address: u64, from: &[Beat]) -> io::Result<()> {
-        self.write(address, bytemuck::cast_slice(from))
-    }
-
-    fn read_words(&mut self, address: u64, to: &mut [u32]) -> io::Result<()> {
-        self.read(address, bytemuck::cast_slice_mut(to))
-    }
-
-    fn write_word(&mut self, address: u64, value: u32) -> io::Result<()> {
-        self.store(address, value)
     }
 }
 
@@ -111,12 +87,15 @@ impl Words for GuestPage {
     }
 
     fn store(&mut self, at: u32, value: u32) -> io::Result<()> {
-        self.memory.store(self.address + u64::from(at), value)
+        self.memory.write_upwards(self.address + u64::from(at), value)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use bitstream_model::DeviceMemory as _;
+    use bitstream_model::interface::record::Beat;
+
     use super::*;
 
     fn memory(bytes: u64) -> (tempfile::NamedTempFile, GuestFile) {

@@ -21,9 +21,6 @@ fn row<'a>(document: &'a Value, order: &str, depth: u64) -> &'a Value {
     found.unwrap_or_else(|| panic!("no row {order} {depth} in {document:#}"))
 }
 
-/// The orders without hazards.
-const OURS: [&str; 2] = ["hazard-free", "hazard-free-nearby"];
-
 #[test]
 fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
     let folder = golden("pile5_step60");
@@ -39,11 +36,10 @@ fn every_order_is_shown_at_every_depth_and_ours_has_no_hazard() {
         // As given, random, three of the thesis, colours, two of ours.
         assert_eq!(rows.len(), 4 * 8, "{arguments:?}");
         for depth in [1, 4, 16, 192] {
-            for ours in OURS.map(|order| row(&document, order, depth)) {
-                assert_eq!((&ours["hazards"], &ours["lost_updates"]), (&0.into(), &0.into()));
-            }
+            let ours = row(&document, "hazard-free", depth);
+            assert_eq!((&ours["hazards"], &ours["lost_updates"]), (&0.into(), &0.into()));
         }
-        for row in rows.iter().filter(|row| !OURS.iter().any(|order| row["order"] == *order)) {
+        for row in rows.iter().filter(|row| row["order"] != "hazard-free") {
             assert_eq!(row["empty"], 0, "{row:#}");
         }
         assert!(number(&document["scene"]["collisions"]) > 100.0);
@@ -89,11 +85,10 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
     }
 }
 
-/// One order falls back to another in some steps: each step's report names its order.
+/// A board without a queue takes the cheaper order of each step, and each step's report names it.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
-    let scene =
-        ["run", "--hazards", "unchecked", "--grid", "9x9x10", "--steps", "70", "--drop", "5"];
+    let scene = ["run", "--profile", "half", "--grid", "1x3x1", "--steps", "80", "--drop", "0.3"];
     let ran = run([&["--json"], &scene[..]].concat());
     let document = ran.json();
     let steps = document["steps"].as_array().expect("steps");
@@ -105,7 +100,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
         }
     }
     let [(first, some), (other, rest)] = counted[..] else { panic!("{counted:?}") };
-    let expected = format!("\norders     of 70 steps {first} in {some}, {other} in {rest}\n");
+    let expected = format!("\norders     of 80 steps {first} in {some}, {other} in {rest}\n");
     let text = run(scene).stdout;
     assert!(text.contains(&expected), "{text}");
 
@@ -162,14 +157,13 @@ fn the_full_step_has_the_hazards_and_live_bodies_that_others_measured() {
 }
 
 #[test]
-fn the_full_step_is_ordered_without_hazards_and_with_few_bodies_alive() {
+fn the_full_step_is_ordered_without_hazards_and_with_hardly_an_empty_slot() {
     let Some(folder) = full_step() else { return };
     let document = order(&["--input", text(&folder)]);
-    for (depth, empty) in [(16, 0.3), (32, 0.3), (64, 0.3), (96, 0.3), (128, 0.5), (192, 0.7)] {
+    for (depth, empty) in [(16, 0.1), (32, 0.1), (64, 0.1), (96, 0.2), (128, 0.2), (192, 0.4)] {
         let ours = row(&document, "hazard-free", depth);
         assert_eq!(ours["hazards"], 0, "{depth}");
         assert!(number(&ours["empty_percent"]) <= empty, "{depth}: {ours:#}");
-        assert!(number(&ours["most_alive"]) <= 800.0, "{depth}: {ours:#}");
-        assert!(number(&ours["longest_span"]) <= 3_300.0, "{depth}: {ours:#}");
+        assert!(number(&ours["most_alive"]) <= 2_300.0, "{depth}: about those as given");
     }
 }

@@ -82,7 +82,7 @@ fn the_table_and_the_summary_say_what_the_document_says() {
     assert_eq!(summary["thesis"]["recorded_ms"], 7.49);
     assert_eq!(summary["thesis"]["inferred_passes"], 8);
     assert!(summary["thesis"]["recorded_passes"].is_null());
-    assert_eq!(document["steps"][0]["order"]["choice"]["reason"], "cheapest");
+    assert_eq!(document["steps"][0]["order"]["choice"]["reason"], "queue");
 }
 
 #[test]

@@ -259,7 +259,11 @@ fn what_cannot_be_studied_is_refused() {
     }
     let ran = run(["solve", input, "--order", "gpu"]);
     assert_eq!(ran.code, Some(2));
-    assert!(ran.stderr.contains("hazard-free-nearby"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("hazard-free"), "{}", ran.stderr);
+    // A name that went: the tip has the one that stays.
+    let ran = run(["solve", input, "--order", "hazard-free-nearby"]);
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.stderr.contains("tip: a similar value exists: 'hazard-free'"), "{}", ran.stderr);
 }
 
 /// Measured on the same step by a program outside this project.

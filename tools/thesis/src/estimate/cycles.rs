@@ -5,6 +5,9 @@
 //!        + max(pose in, result out) + integration fill
 //! ```
 //!
+//! This is a step in the order of the stream, as the thesis has it: an issue queue adds its filling
+//! to each pass (interface specification, cycles).
+//!
 //! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
 //!
 //! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this

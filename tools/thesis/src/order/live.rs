@@ -1,7 +1,8 @@
 //! Figure 4.13: bodies alive in each slot of the thesis' sorted order.
 
-use zynq_pgs::order::{IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule, live_curve};
+use zynq_pgs::order::{IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule};
 
+use super::report::live_curve;
 use crate::estimate::thesis::BODIES;
 use crate::experiment::Part;
 use crate::figure::{Axis, Drawn, Figure, Series, lines};
@@ -50,7 +51,7 @@ pub(super) fn add(
         ("Algorithm 3, ties by the newest", thesis(Ties::Newest)),
         ("hazard-free (ours)", ours(Order::HazardFree)?),
     ] {
-        let alive = live_curve(&schedule, input, window)?;
+        let alive = live_curve(&schedule, input, window);
         let largest = grouped(alive.iter().copied().max().unwrap_or(0).into());
         most.push(format!("{largest} ({})", name.replace("Algorithm 3, ", "")));
         series.push(Series::new(name, Drawn::Line, thinned(&alive)));

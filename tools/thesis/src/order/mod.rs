@@ -2,6 +2,7 @@
 
 mod cost;
 mod live;
+mod report;
 mod rows;
 mod source;
 

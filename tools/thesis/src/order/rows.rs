@@ -1,11 +1,10 @@
 //! Measures every order of the collisions at every depth.
 
 use scene::SplitMix64;
-use zynq_pgs::order::{
-    Checker, IssueWindow, Order, OrderError, OrderInput, OrderReport, Orderer, Schedule,
-};
+use zynq_pgs::order::{Checker, IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule};
 
 use super::cost;
+use super::report::OrderReport;
 use super::source::Source;
 use crate::permutation::body_by_body::{self, Ties};
 use crate::permutation::{Making, colours, shuffled};
@@ -79,7 +78,7 @@ pub(super) fn measure(
                     }
                 }
             }
-            let report = OrderReport::measure(&schedule, &input, window)?;
+            let report = OrderReport::measure(&schedule, &input, window);
             rows.push(Row { order: name.clone(), depth: window.depth(), report, host_ns });
         }
     }
@@ -119,8 +118,8 @@ fn kinds(source: &Source) -> Vec<(String, Kind)> {
     kinds.extend(thesis.map(|(name, making)| (name.to_owned(), Kind::Permuted(making))));
     kinds.extend([
         (format!("{colours} colours"), Kind::Permuted(|input| colours::order(input).0)),
+        ("interleaved".to_owned(), Kind::Made(Order::Interleaved)),
         ("hazard-free".to_owned(), Kind::Made(Order::HazardFree)),
-        ("hazard-free-nearby".to_owned(), Kind::Made(Order::HazardFreeNearby)),
     ]);
     kinds
 }

@@ -136,7 +136,6 @@ mod tests {
         let input = OrderInput {
             pairs: &[[1, 4], [1, 3], [1, 2], [2, 5], [3, 6], [4, 7], [4, 8], [0, 9]],
             moving: &[false, true, true, true, true, true, true, true, true, true],
-            positions: &[[0.0; 3]; 10],
         };
         let ordered = |ties| order(&input, ties);
         // Active in the order 1, 4, 3, 2.

@@ -7,6 +7,7 @@
 //! Source: `Bullet3OpenCL`, `b3GpuPgsContactSolver`, `SetSortDataKernel` and
 //! `sortConstraintByBatch3`.
 
+use zynq_pgs::Body;
 use zynq_pgs::order::OrderInput;
 
 /// Edge of a cell, m.
@@ -17,11 +18,11 @@ const CELLS: [u32; 3] = [8, 4, 8];
 const BATCH: usize = 64;
 
 /// The order as indices of collisions, without empty ones.
-pub(crate) fn order(input: &OrderInput<'_>) -> Vec<u32> {
+pub(crate) fn order(input: &OrderInput<'_>, bodies: &[Body]) -> Vec<u32> {
     let mut keyed: Vec<(u32, u32)> = (0..)
         .zip(input.pairs)
         .filter(|(_, pair)| **pair != OrderInput::EMPTY)
-        .map(|(index, pair)| (key(input, *pair), index))
+        .map(|(index, pair)| (key(input, bodies, *pair), index))
         .collect();
     keyed.sort_unstable();
     let mut order: Vec<u32> = Vec::with_capacity(keyed.len());
@@ -37,10 +38,11 @@ pub(crate) fn order(input: &OrderInput<'_>) -> Vec<u32> {
 
 /// The place of a pair's cell in the sequence: first the parities of its coordinates, z before y
 /// before x, then the halves of the coordinates likewise.
-fn key(input: &OrderInput<'_>, [a, b]: [u32; 2]) -> u32 {
+fn key(input: &OrderInput<'_>, bodies: &[Body], [a, b]: [u32; 2]) -> u32 {
     let body = if is_moving(input, a) { a } else { b };
     let body = usize::try_from(body).ok();
-    let position = body.and_then(|body| input.positions.get(body)).copied().unwrap_or_default();
+    let body = body.and_then(|body| bodies.get(body));
+    let position = body.map(|body| body.pose.position).unwrap_or_default();
     let [x, y, z] = [0, 1, 2].map(|axis: usize| cell(position[axis]) & (CELLS[axis] - 1));
     let parities = (z & 1) << 2 | (y & 1) << 1 | (x & 1);
     let halves = ((z >> 1) * (CELLS[1] >> 1) + (y >> 1)) * (CELLS[0] >> 1) + (x >> 1);
@@ -94,6 +96,7 @@ mod tests {
     use std::path::PathBuf;
 
     use zynq_pgs::order::InputBuffers;
+    use zynq_pgs::{Pose, Velocity};
 
     use super::super::recorded;
     use super::*;
@@ -113,9 +116,11 @@ mod tests {
         let theirs = recorded(&path, folder.collisions.len()).expect("an order").expect("the file");
         let mut buffers = InputBuffers::new();
         let input = buffers.gather(&folder.bodies, &folder.collisions[..], &folder.shapes);
-        let ours = order(&input);
-        let cell_of =
-            |index: &u32| key(&input, input.pairs[usize::try_from(*index).expect("an index")]);
+        let ours = order(&input, &folder.bodies);
+        let cell_of = |index: &u32| {
+            let pair = input.pairs[usize::try_from(*index).expect("an index")];
+            key(&input, &folder.bodies, pair)
+        };
         let cells = |order: &[u32]| -> Vec<Vec<u32>> {
             order.chunk_by(|a, b| cell_of(a) == cell_of(b)).map(<[u32]>::to_vec).collect()
         };
@@ -127,19 +132,21 @@ mod tests {
         assert_eq!((ours.len(), same), (256, 223));
     }
 
-    fn input<'a>(
-        pairs: &'a [[u32; 2]],
-        moving: &'a [bool],
-        positions: &'a [[f32; 3]],
-    ) -> OrderInput<'a> {
-        OrderInput { pairs, moving, positions }
+    /// The order of pairs of bodies at these positions.
+    fn ordered(pairs: &[[u32; 2]], moving: &[bool], positions: &[[f32; 3]]) -> Vec<u32> {
+        let at = |position: &[f32; 3]| {
+            let pose = Pose { position: *position, orientation: [0.0, 0.0, 0.0, 1.0] };
+            Body { pose, velocity: Velocity::default(), shape: 0 }
+        };
+        let bodies: Vec<Body> = positions.iter().map(at).collect();
+        order(&OrderInput { pairs, moving }, &bodies)
     }
 
     #[test]
     fn cells_that_touch_are_in_different_groups() {
         let positions = [[1.0, 1.0, 1.0], [7.0, 1.0, 1.0], [13.0, 1.0, 1.0], [1.0, 1.0, -6.0]];
         let pairs = [[0, 0], [1, 1], [2, 2], [3, 3]];
-        let found = order(&input(&pairs, &[true; 4], &positions));
+        let found = ordered(&pairs, &[true; 4], &positions);
         // Along x cell 0, cell 2, and then cell 1; along z cell 0 before cell 7, which is -1
         // folded.
         assert_eq!(found, [0, 2, 1, 3]);
@@ -150,7 +157,7 @@ mod tests {
         // A chain of bodies 1 to 4 on the ground, body 0.
         let pairs = [[0, 1], [1, 2], [2, 3], [3, 4], [0, 3]];
         let moving = [false, true, true, true, true];
-        let found = order(&input(&pairs, &moving, &[[0.0; 3]; 5]));
+        let found = ordered(&pairs, &moving, &[[0.0; 3]; 5]);
         // 0-1 and 2-3 first; the swap has put 1-2 behind; then 1-2 and 3-4; then 0-3.
         assert_eq!(found, [0, 2, 1, 3, 4]);
     }
@@ -159,14 +166,14 @@ mod tests {
     fn sixty_four_collisions_free_the_bodies() {
         let pairs: Vec<[u32; 2]> = (1..=64).chain([1]).map(|body| [0, body]).collect();
         let moving: Vec<bool> = (0..65).map(|body| body > 0).collect();
-        let found = order(&input(&pairs, &moving, &[[0.0; 3]; 65]));
+        let found = ordered(&pairs, &moving, &[[0.0; 3]; 65]);
         assert_eq!(found, (0..65).collect::<Vec<_>>());
     }
 
     #[test]
     fn an_empty_collision_has_no_place() {
         let pairs = [OrderInput::EMPTY, [0, 1]];
-        assert_eq!(order(&input(&pairs, &[false, true], &[[0.0; 3]; 2])), [1]);
-        assert!(order(&input(&[], &[], &[])).is_empty());
+        assert_eq!(ordered(&pairs, &[false, true], &[[0.0; 3]; 2]), [1]);
+        assert!(ordered(&[], &[], &[]).is_empty());
     }
 }

@@ -45,7 +45,7 @@ mod tests {
     fn a_star_has_as_many_colours_as_points() {
         let pairs: Vec<[u32; 2]> = (1..=150).map(|body| [0, body]).collect();
         let moving = [true; 151];
-        let input = OrderInput { pairs: &pairs, moving: &moving, positions: &[[0.0; 3]; 151] };
+        let input = OrderInput { pairs: &pairs, moving: &moving };
         let (found, colours) = order(&input);
         assert_eq!((found.len(), colours), (150, 150));
         let still = OrderInput { moving: &[[false].as_slice(), &moving[1..]].concat(), ..input };

@@ -79,6 +79,8 @@ enum Source {
     Random(SplitMix64),
     /// The order of the only step.
     Given(Vec<u32>),
+    /// By the cells of Bullet's GPU.
+    Cells,
     Made(Making),
 }
 
@@ -91,7 +93,7 @@ impl Arranger {
         let source = match (permutation, recorded) {
             (Permutation::Random(seed), _) => Source::Random(SplitMix64::new(seed)),
             (Permutation::Gpu, Some(order)) => Source::Given(order),
-            (Permutation::Gpu, None) => Source::Made(cells::order),
+            (Permutation::Gpu, None) => Source::Cells,
             (Permutation::Colours, _) => Source::Made(|input| colours::order(input).0),
             (Permutation::BodyByBody(ties), _) => Source::Made(match ties {
                 Ties::LowestIndex => |input| body_by_body::order(input, Ties::LowestIndex),
@@ -122,6 +124,10 @@ impl Arranger {
                 &made
             }
             Source::Given(order) => order,
+            Source::Cells => {
+                made = cells::order(&input, bodies);
+                &made
+            }
             Source::Made(making) => {
                 made = making(&input);
                 &made

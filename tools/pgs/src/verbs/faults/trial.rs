@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount};
-use scene::{Grid, Scene, SceneOptions};
+use scene::{Grid, Scene, SceneOptions, WarmStart};
 use zynq_pgs::error::Aftermath;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Collision, ContactMemory, Error, Impulses, OpenOptions, Shape,
-    StepParameters, WarmCollisions,
+    Accelerator, BoardChoice, Body, Collision, Collisions as _, Error, Impulses, OpenOptions,
+    Shape, StepParameters, WarmCollisions,
 };
 
 use super::cells::Cell;
@@ -16,7 +16,6 @@ use super::expected::Expected;
 use pgs_command::board;
 use pgs_command::common::AcceleratorChoice;
 use pgs_command::failure::{Failure, Result};
-use pgs_command::options::scenes::CONTACT_REACH;
 
 /// Limits on the board's clock: for a step of the model and of a simulator, which needs seconds for
 /// a millisecond; for reading all registers after a timeout; and for the reset of all parts.
@@ -168,19 +167,21 @@ impl State {
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
         let parameters = start.parameters();
-        let mut memory = ContactMemory::new(CONTACT_REACH);
+        let mut warm = WarmStart::default();
         for _ in 0..SETTLING {
             scene.detect();
             let (bodies, collisions) = scene.parts_mut();
-            let impulses = memory.recall(collisions, 1.0);
-            let warm = WarmCollisions { collisions, impulses: &impulses };
-            accelerator.step(bodies, &warm, &parameters).map_err(Failure::input)?;
-            memory.remember(collisions, accelerator.impulses());
+            let placed = warm.placed(collisions, 1.0).map_err(Failure::input)?;
+            accelerator.step(bodies, &placed, &parameters).map_err(Failure::input)?;
+            if parameters.impulses_out {
+                warm.commit(collisions, accelerator.impulses()).map_err(Failure::input)?;
+            }
         }
         scene.detect();
         let mut after = Vec::new();
         let collisions = scene.collisions().to_vec();
-        let impulses = memory.recall(&collisions, 1.0);
+        let placed = warm.placed(&collisions, 1.0).map_err(Failure::input)?;
+        let impulses: Vec<_> = (0..collisions.len()).map(|at| placed.impulses(at)).collect();
         let (port, mut takes) = (emulated.cpu_port(), Duration::ZERO);
         // From the second step on the channels are running.
         for _ in 0..2 {

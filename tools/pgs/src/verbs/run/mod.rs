@@ -11,10 +11,10 @@ mod summary;
 use std::io::{self, Write};
 
 use clap::Args;
-use scene::Scene;
+use scene::{Scene, WarmStart};
 use serde_json::Value;
 use zynq_pgs::board::BoardKind;
-use zynq_pgs::{Capabilities, ContactMemory, StepParameters, StepReport};
+use zynq_pgs::{Capabilities, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
@@ -32,7 +32,7 @@ use pgs_command::interrupt::Interrupt;
 use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
-use pgs_command::options::scenes::{CONTACT_REACH, ITERATIONS, STEPS, SceneArgs};
+use pgs_command::options::scenes::{ITERATIONS, STEPS, SceneArgs};
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
 use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
@@ -312,14 +312,14 @@ fn take_steps(
 ) -> Result<()> {
     let progress = progress_bar(args.steps());
     let variant = opened.accelerator.capabilities().variant;
-    let mut memory = parameters.warm_start.then(|| ContactMemory::new(CONTACT_REACH));
+    let mut warm = parameters.warm_start.then(WarmStart::default);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
         let tracing = tracing.filter(|(_, step)| *step == number).map(|(tracing, _)| tracing);
         if let Some(tracing) = tracing {
             tracing.begin();
         }
-        let row = step(number, parameters, &mut opened.accelerator, scene, memory.as_mut());
+        let row = step(number, parameters, &mut opened.accelerator, scene, warm.as_mut());
         let traced = tracing.map(|tracing| {
             let row = row.as_ref().ok().and_then(Option::as_ref);
             tracing.end(row.map(|row| &row.report))

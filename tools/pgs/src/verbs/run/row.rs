@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use scene::Scene;
+use scene::{Scene, WarmStart};
 use serde_json::Value;
-use zynq_pgs::{Accelerator, ContactMemory, StepParameters, StepReport, WarmCollisions};
+use zynq_pgs::{Accelerator, StepParameters, StepReport};
 
 use pgs_command::board::is_cancelled;
 use pgs_command::numbers::grouped;
@@ -72,14 +72,14 @@ impl Row {
     }
 }
 
-/// Detects collisions and takes one step; none if Ctrl-C ended it. With a memory the step begins
-/// with the impulses of the last one.
+/// Detects collisions and takes one step; none if Ctrl-C ended it. It begins with the impulses of
+/// the last one, if that is given.
 pub(super) fn step(
     number: u32,
     parameters: &StepParameters,
     accelerator: &mut Accelerator,
     scene: &mut Scene,
-    memory: Option<&mut ContactMemory>,
+    warm: Option<&mut WarmStart>,
 ) -> Result<Option<Row>, zynq_pgs::Error> {
     let begin = Instant::now();
     scene.detect();
@@ -87,16 +87,14 @@ pub(super) fn step(
     let ground_pairs = scene.ground_pairs();
     let deepest = scene::penetration(scene.collisions()).largest;
     let (bodies, collisions) = scene.parts_mut();
-    let stepped = match memory {
+    let stepped = match warm {
         None => accelerator.step(bodies, collisions, parameters),
-        Some(memory) => {
-            let impulses = memory.recall(collisions, WARM_FACTOR);
-            let warm = WarmCollisions { collisions, impulses: &impulses };
-            let stepped = accelerator.step(bodies, &warm, parameters);
-            if stepped.is_ok() {
-                memory.remember(collisions, accelerator.impulses());
-            }
-            stepped
+        Some(warm) => {
+            let placed = warm.placed(collisions, WARM_FACTOR)?;
+            accelerator.step(bodies, &placed, parameters).and_then(|report| {
+                warm.commit(collisions, accelerator.impulses())?;
+                Ok(report)
+            })
         }
     };
     let report = match stepped {

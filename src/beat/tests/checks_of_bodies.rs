@@ -1,6 +1,6 @@
 //! Compares the packer's checks of bodies, and of collisions with bodies far away, with validation.
 
-use super::screen::{BODY, said};
+use super::checks::{BODY, said};
 use crate::scene::{Body, Collision, Contact};
 use crate::validate::InputError;
 use crate::validate::Limits;

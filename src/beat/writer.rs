@@ -5,27 +5,23 @@ use std::fmt;
 use pgs_interface::record::Beat;
 use pgs_support::float_env::standard;
 
-use super::collisions::{CollisionPacker, Seen};
-use super::target::Target;
-use crate::beat::stripe::BLOCK;
+use super::collisions::{CollisionPacker, IN_ARRAY};
+use super::pool::whole;
+use super::stripe::BLOCK;
 use crate::record::body_table::Ends;
-use crate::record::source::Contiguous;
 use crate::scene::Collision;
-use crate::validate::InputError;
-use crate::validate::{Block, Quick};
+use crate::validate::{InputError, Scene};
 
 /// Takes the collisions of a step straight into the memory that the board reads.
 ///
 /// A few of them lie in the cache until their records are made; no copy of the others is kept.
 pub struct Writer<'a> {
-    quick: Option<&'a Quick<'a>>,
+    scene: &'a Scene<'a>,
     ends: Ends<'a>,
     /// `None` for a step without bodies, which has no records.
-    packer: Option<CollisionPacker<'a, 'a>>,
+    packer: Option<CollisionPacker<'a>>,
     /// Collisions that were looked at, and whose records are made.
     done: usize,
-    /// Those among them that are padding.
-    paddings: usize,
     /// Collisions whose records are not made yet.
     block: [Collision; BLOCK],
     held: usize,
@@ -60,24 +56,23 @@ impl<'a> Writer<'a> {
     /// Shape: each channel is as long as
     /// [`Layout::beats_on_channel`](crate::beat::stripe::Layout::beats_on_channel) says for `room`.
     pub(crate) fn new(
-        target: Target<'a>,
+        scene: &'a Scene<'a>,
         ends: Ends<'a>,
         room: usize,
         channels: &'a mut [&'a mut [Beat]],
     ) -> Self {
-        let packer = CollisionPacker::new(target, ends, 0, channels);
-        Self { packer: Some(packer), ..Self::without_bodies(target, ends, room) }
+        let packer = CollisionPacker::new(scene, ends, whole(channels), None);
+        Self { packer: Some(packer), ..Self::without_bodies(scene, ends, room) }
     }
 
     /// As [`Self::new`], for a step without bodies. All of its collisions must be without contact
     /// points.
-    pub(crate) fn without_bodies(target: Target<'a>, ends: Ends<'a>, room: usize) -> Self {
+    pub(crate) fn without_bodies(scene: &'a Scene<'a>, ends: Ends<'a>, room: usize) -> Self {
         Self {
-            quick: target.quick,
+            scene,
             ends,
             packer: None,
             done: 0,
-            paddings: 0,
             block: [Collision::NOTHING; BLOCK],
             held: 0,
             room,
@@ -144,20 +139,18 @@ impl<'a> Writer<'a> {
         if count == 0 {
             return;
         }
-        let (first, collisions) = (self.done, Contiguous(&self.block[..count]));
-        let seen = match &mut self.packer {
-            Some(packer) => packer.write(collisions),
-            None => {
-                let good = self.block[..count].iter().all(Collision::is_empty);
-                Seen { good, paddings: count }
+        let (first, collisions) = (self.done, &self.block[..count]);
+        let good = match &mut self.packer {
+            Some(packer) => {
+                packer.write(collisions, &IN_ARRAY, count);
+                packer.is_good()
             }
+            None => collisions.iter().all(Collision::is_empty),
         };
         self.done += count;
-        self.paddings += seen.paddings;
-        if !seen.good {
-            let block = Block { first, collisions, ends: self.ends };
-            let found = self.quick.and_then(|quick| quick.refusal(&block).err());
-            // A block that was not written is never sent.
+        if !good {
+            let found = self.scene.refusal(first, collisions, self.ends).err();
+            // Collisions that no index of the stream can name are never sent.
             self.refused = Some(found.unwrap_or(InputError::Unsteady));
         }
     }
@@ -166,15 +159,17 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// The refusal of the first wrong collision by validation; [`InputError::MoreThanAnnounced`];
-    /// [`InputError::Unsteady`] if collisions were not written although nothing is wrong with them,
-    /// which the driver's limits on bodies rule out.
+    /// [`InputError::Unsteady`] if the stream's indices do not name all bodies, which the driver's
+    /// limits on bodies rule out.
     pub(crate) fn finish(mut self) -> Result<Written, InputError> {
         self.flush();
         match self.refused {
             Some(refused) => Err(refused),
             None => {
-                let Self { done: collisions, paddings, packer, .. } = self;
-                let sum = packer.map_or(0, CollisionPacker::finish);
+                let Self { done: collisions, packer, .. } = self;
+                let packed = packer.map(CollisionPacker::finish);
+                let (sum, paddings) =
+                    packed.map_or((0, collisions), |packed| (packed.sum, packed.paddings));
                 Ok(Written { sum, collisions, paddings })
             }
         }
@@ -185,18 +180,17 @@ impl<'a> Writer<'a> {
 mod tests {
     use bytemuck::Zeroable as _;
 
-    use super::super::bodies::survey;
     use super::*;
-    use crate::beat::pack::pool::PackPool;
+    use crate::beat::Target;
     use crate::beat::stripe::Segment;
-    use crate::record::body_table::{Survey, Table};
+    use crate::beat::tests::surveyed;
     use crate::scene::{Body, Contact, Shape, StepParameters};
     use crate::validate::{Limits, preflight};
     use pgs_interface::profile::HALF;
 
     /// The driver's limits on bodies rule this case out, but the refusal does not rest on them.
     #[test]
-    fn what_is_not_written_is_refused() {
+    fn what_no_index_can_name_is_refused() {
         let shapes = [Shape::isotropic(1.0, 1.0)];
         let mut body = Body::zeroed();
         body.pose.orientation = [0.0, 0.0, 0.0, 1.0];
@@ -213,25 +207,21 @@ mod tests {
             let limits = Limits::roomy(variant);
             let list = vec![collision; BLOCK];
             let parameters = StepParameters::default();
-            let scene = preflight(&bodies, &list, &shapes, &parameters, &limits);
-            let quick = Quick::new(scene.expect("limits that rule nothing out"));
-            for quick in [None, Some(&quick)] {
-                let target =
-                    Target { variant: &variant, shapes: &shapes, streamed_masses: false, quick };
-                let (mut ends, mut statics) = (Table::default(), Vec::new());
-                let into = Survey { ends: &mut ends, statics: &mut statics };
-                assert!(survey(target, &bodies, count, into, &mut PackPool::alone()));
-                let layout = Segment::Collisions.layout(&variant);
-                let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
-                    vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
-                });
-                let mut views = buffers.each_mut().map(Vec::as_mut_slice);
-                let mut writer = Writer::new(target, ends.ends(), BLOCK, &mut views);
-                list.iter().for_each(|collision| writer.push(collision));
-                let finished = writer.finish();
-                let expected = if fits { Ok(BLOCK) } else { Err(InputError::Unsteady) };
-                assert_eq!(finished.map(|written| written.collisions), expected, "{count}");
-            }
+            let scene = preflight(&bodies, &list, &shapes, &parameters, &limits)
+                .expect("limits that rule nothing out");
+            let target = Target { scene: &scene, streamed_masses: false };
+            let (table, good) = surveyed(target, &bodies);
+            assert!(good);
+            let layout = Segment::Collisions.layout(&variant);
+            let mut buffers: [Vec<Beat>; 3] = std::array::from_fn(|channel| {
+                vec![Beat::default(); layout.beats_on_channel(BLOCK, channel)]
+            });
+            let mut views = buffers.each_mut().map(Vec::as_mut_slice);
+            let mut writer = Writer::new(&scene, table.ends(), BLOCK, &mut views);
+            list.iter().for_each(|collision| writer.push(collision));
+            let finished = writer.finish();
+            let expected = if fits { Ok(BLOCK) } else { Err(InputError::Unsteady) };
+            assert_eq!(finished.map(|written| written.collisions), expected, "{count}");
         }
     }
 }

@@ -1,22 +1,15 @@
 //! Compares the packer's checks of the input with validation.
 
-use std::sync::atomic::Ordering;
-
-use crate::beat::pack::bodies::{pack_bodies, survey};
-use crate::beat::pack::collisions::{CollisionPacker, Entries, pack_collisions};
-use crate::beat::pack::pool::PackPool;
-use crate::beat::pack::stripe_writer::CHECKED;
-use crate::beat::pack::target::Target;
-use crate::beat::stripe::Segment;
+use super::{buffers, surveyed, views};
+use crate::beat::Target;
+use crate::beat::collisions::{Entries, pack_collisions};
+use crate::beat::pool::PackPool;
+use crate::beat::stripe::{BLOCK, Segment};
 use crate::order::{Ordered, Schedule};
-use crate::record::body_table::{Ends, Survey, Table};
-use crate::record::source::Contiguous;
+use crate::record::body_table::Ends;
 use crate::scene::{Body, Collision, Collisions, Contact, Pose, Shape, StepParameters, Velocity};
-use crate::validate::InputError;
-use crate::validate::{Limits, Quick, preflight, validate};
-use pgs_interface::number::{Numbers, Precision, StreamFormat};
-use pgs_interface::profile::{FLOAT, HALF, NAIVE, PROFILES, Variant};
-use pgs_interface::record::Beat;
+use crate::validate::{InputError, Limits, preflight, validate};
+use pgs_interface::profile::{FLOAT, HALF, NAIVE, PROFILES};
 
 const SHAPES: [Shape; 3] =
     [Shape::STATIC, Shape::isotropic(1.0, 1.5), Shape::isotropic(0.5, 100.0)];
@@ -36,48 +29,18 @@ const CONTACT: Contact = Contact { point: [1.5, 2.5, 3.5], distance: -0.01 };
 const COLLISION: Collision =
     Collision { body_a: 3, body_b: 4, normal: [0.0, 1.0, 0.0], count: 3, contacts: [CONTACT; 4] };
 
-/// Buffers for `records` records.
-fn buffers(variant: &Variant, segment: Segment, records: usize) -> Vec<Vec<Beat>> {
-    let layout = segment.layout(variant);
-    let channels = variant.profile.mm2s_widths.len();
-    (0..channels)
-        .map(|channel| vec![Beat::default(); layout.beats_on_channel(records, channel)])
-        .collect()
-}
-
-fn views(buffers: &mut [Vec<Beat>]) -> Vec<&mut [Beat]> {
-    buffers.iter_mut().map(Vec::as_mut_slice).collect()
-}
-
-/// Whether packing accepts these entries. Packing without checks must write the same beats.
-fn looked_at<C: Collisions + ?Sized>(
+/// Whether packing accepts these entries.
+fn accepts<C: Collisions + ?Sized>(
     target: Target<'_>,
     ends: Ends<'_>,
     entries: &Entries<'_, C>,
 ) -> bool {
-    let packed = |target: Target<'_>| {
-        let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
-        let views = &mut views(&mut channels);
-        let (sum, seen) = pack_collisions(target, ends, entries, views, &mut PackPool::alone());
-        ((channels, sum), seen)
-    };
-    let (beats, found) = packed(target);
-    // The other loop packs a scene with few contact points.
-    let list: Vec<_> = (0..entries.count).map(|at| entries.collisions.collision(at)).collect();
-    let mut channels = buffers(target.variant, Segment::Collisions, entries.count);
-    let mut views = views(&mut channels);
-    let packer = CollisionPacker::new(target, ends, 0, &mut views);
-    let mut packer = packer.expecting_few_full();
-    let seen = packer.write(Contiguous(&list));
-    // `pack_collisions` compares the number of paddings over all blocks; this loop does not.
-    assert!(entries.added.is_some() || seen == found, "found as in the other loop: {seen:?}");
-    let empty = list.iter().filter(|collision| collision.count == 0).count();
-    assert_eq!(found.paddings, empty);
-    let sum = packer.finish();
-    assert!((channels, sum) == beats, "the same beats in either loop");
-    let (unchecked, all) = packed(Target { quick: None, ..target });
-    assert!(unchecked == beats && all.good, "the same beats");
-    found.good
+    let mut channels = buffers(target.scene.variant, Segment::Collisions, entries.count);
+    let (views, packers) = (&mut views(&mut channels), &mut PackPool::alone());
+    let packed = pack_collisions(target, ends, entries, views, None, packers);
+    let empty = (0..entries.count).filter(|at| entries.collisions.collision(*at).count == 0);
+    assert_eq!(packed.paddings, empty.count());
+    packed.good
 }
 
 /// The verdict of packing on a step, and that of validation.
@@ -90,113 +53,60 @@ pub(crate) fn said(
     collisions: &Vec<Collision>,
     schedule: Option<&Schedule>,
 ) -> Option<Said> {
-    said_and_doubted(limits, bodies, collisions, schedule).map(|(said, _)| said)
+    let parameters = StepParameters::default();
+    said_with(limits, &parameters, bodies, collisions, schedule)
 }
 
-/// As [`said`], with the number of blocks that failed the quick check, so that packing checked them
-/// exactly.
-fn said_and_doubted(
+/// As [`said`], for a step with these parameters.
+fn said_with(
     limits: &Limits,
+    parameters: &StepParameters,
     bodies: &Vec<Body>,
     collisions: &Vec<Collision>,
     schedule: Option<&Schedule>,
-) -> Option<(Said, usize)> {
-    let (parameters, shapes) = (StepParameters::default(), &SHAPES);
-    let scene = preflight(bodies, collisions, shapes, &parameters, limits).ok()?;
-    let quick = Quick::new(scene);
-    let variant = &limits.variant;
-    let target = Target { variant, shapes, streamed_masses: false, quick: Some(&quick) };
-    let (mut ends, mut statics) = (Table::default(), Vec::new());
-    let count = bodies.len();
-    let mut velocities = buffers(variant, Segment::Velocities, count);
-    let mut poses = buffers(variant, Segment::Poses, count);
-    let (.., bodies_good) = pack_bodies(
-        target,
-        bodies,
-        count,
-        Survey { ends: &mut ends, statics: &mut statics },
-        (&mut views(&mut velocities), &mut views(&mut poses)),
-        &mut PackPool::alone(),
-    );
+) -> Option<Said> {
+    let shapes = &SHAPES;
+    let scene = preflight(bodies, collisions, shapes, parameters, limits).ok()?;
+    let target = Target { scene: &scene, streamed_masses: false };
+    let (table, bodies_good) = surveyed(target, bodies);
     let moves =
         |body: &Body| shapes.get(body.shape as usize).is_some_and(|shape| !shape.is_static());
     let still = (0..).zip(bodies).filter(|(_, body)| !moves(body)).map(|(at, _)| at);
-    assert_eq!(statics, still.collect::<Vec<u32>>());
-    let (mut other_ends, mut other_statics) = (Table::default(), vec![7]);
-    let into = Survey { ends: &mut other_ends, statics: &mut other_statics };
-    assert_eq!(survey(target, bodies, count, into, &mut PackPool::alone()), bodies_good);
-    // The comparison is by bytes, as a position may be NaN.
-    let bytes = |ends: &Table| bytemuck::cast_slice::<_, u8>(ends.of_bodies()).to_vec();
-    assert_eq!((bytes(&other_ends), other_statics), (bytes(&ends), statics));
+    assert_eq!(table.statics().collect::<Vec<_>>(), still.collect::<Vec<u32>>());
     let count = schedule.map_or(collisions.len(), Schedule::len);
     let added = schedule.map(Schedule::empty);
     let good = match schedule {
-        None => looked_at(target, ends.ends(), &Entries { collisions, count, added }),
+        None => accepts(target, table.ends(), &Entries { collisions, count, added }),
         Some(schedule) => {
             let collisions = &Ordered { collisions, schedule };
-            looked_at(target, ends.ends(), &Entries { collisions, count, added })
+            accepts(target, table.ends(), &Entries { collisions, count, added })
         }
     };
-    let valid = validate(bodies, collisions, shapes, &parameters, limits);
-    Some(((bodies_good & good, valid), quick.doubted.load(Ordering::Relaxed)))
+    let valid = validate(bodies, collisions, shapes, parameters, limits);
+    Some((bodies_good & good, valid))
 }
 
-/// An ordinary scene passes the quick check of every bitstream. A second check would be as right,
-/// and slow.
+/// The friction of a pair is above its number of points, and must not be taken for points.
 #[test]
-fn a_pile_is_found_good_at_once() {
-    let body = |x: f32, shape| Body {
-        pose: Pose { position: [x, 0.5, 90.0], orientation: [0.0, 0.6, 0.0, 0.8] },
-        velocity: Velocity { linear: [0.1, -9.0, 0.0], angular: [0.0; 3] },
-        shape,
-    };
-    // The centre of the ground is far away.
-    let ground = Body { velocity: Velocity::default(), ..body(-400.0, 0) };
-    let moving = (0..299).map(|at| body(at as f32 / 4.0, 1));
-    let bodies: Vec<Body> = std::iter::once(ground).chain(moving).collect();
-    let far = Contact { point: [f32::NAN; 3], distance: f32::INFINITY };
-    let pile = |count: fn(u32) -> u32| -> Vec<Collision> {
-        let collision = |at| {
-            let x = (at - 1) as f32 / 4.0;
-            let contact = Contact { point: [x, 0.25, 89.75], distance: -0.01 };
-            let mut contacts = [contact; 4];
-            contacts[count(at) as usize..].fill(far);
-            let other = if at % 5 == 0 { 0 } else { at + 1 };
-            let [body_a, body_b] = if at % 2 == 0 { [at, other] } else { [other, at] };
-            let normal = [0.6, 0.0, if at % 3 == 0 { 0.8 } else { -0.8 }];
-            Collision { body_a, body_b, normal, count: count(at), contacts }
-        };
-        (1..299).map(collision).collect()
-    };
-    // Collisions have one to four contact points in the first pile, and nearly always four in the
-    // second.
-    let piles = [pile(|at| 1 + at % 4), pile(|at| if at % 60 == 0 { 2 } else { 4 })];
-    let entries = (0..298).map(|at| (at % 90 != 89).then_some(at));
-    let schedule: Schedule = entries.chain((0..298).filter(|at| at % 90 == 89).map(Some)).collect();
-    let formats = StreamFormat::ALL;
-    for profile in PROFILES {
-        for inertia in profile.inertias().iter().copied() {
-            for format in formats {
-                for rows in [Precision::F32, Precision::Binary16] {
-                    let mut variant = Variant { inertia, ..profile.default_variant() };
-                    if format.bits() != variant.numbers.collisions.bits() {
-                        continue;
-                    }
-                    variant.numbers = Numbers { rows, collisions: format, ..variant.numbers };
-                    let ordered = [None, Some(&schedule)];
-                    for (schedule, collisions) in
-                        ordered.into_iter().flat_map(|it| piles.iter().map(move |pile| (it, pile)))
-                    {
-                        let limits = Limits::roomy(variant);
-                        let ((good, valid), doubted) =
-                            said_and_doubted(&limits, &bodies, collisions, schedule)
-                                .expect("nothing else wrong");
-                        let of = (profile.name, inertia, format, rows, schedule.is_some());
-                        let count = collisions[0].count;
-                        assert_eq!((good, valid, doubted), (true, Ok(()), 0), "{of:?} {count}");
-                    }
-                }
-            }
+fn a_friction_is_accepted_where_validation_accepts_it() {
+    let bodies = vec![BODY; 8];
+    let own = COLLISION.with_friction(0.5);
+    for pair_friction in [false, true] {
+        let parameters = StepParameters::default().with_pair_friction(pair_friction);
+        for (collision, right) in [
+            (COLLISION, true),
+            (own, pair_friction),
+            // Nothing but a friction is no padding.
+            (Collision { count: own.count & 0xFFFF_0000, ..own }, pair_friction),
+            (COLLISION.with_friction(f32::INFINITY), false),
+            (Collision { count: own.count | 1 << 31, ..own }, false),
+            (Collision { count: own.count + 2, ..own }, false),
+        ] {
+            let limits = Limits::roomy(FLOAT.default_variant());
+            let list = vec![collision; 3];
+            let (good, valid) =
+                said_with(&limits, &parameters, &bodies, &list, None).expect("nothing else wrong");
+            assert_eq!((good, valid.is_ok()), (right, right), "{:#x}", collision.count);
         }
     }
 }
@@ -214,16 +124,12 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     let mut collision = COLLISION;
     collision.contacts[3] = Contact { point: [f32::NAN; 3], distance: f32::NAN };
     let full = Collision { count: 4, ..COLLISION };
-    // No collision of the first pile has all contact points, and most of the second have.
-    let piles = [vec![collision; 2 * CHECKED + 1], {
-        let mut collisions = vec![full; 2 * CHECKED + 1];
-        collisions.iter_mut().step_by(50).for_each(|some| *some = collision);
-        collisions
-    }];
+    // Some collisions have all contact points.
+    let mut collisions = vec![collision; 2 * BLOCK + 1];
+    collisions.iter_mut().step_by(2).for_each(|some| *some = full);
+    let collisions = &collisions;
     let profiles = [&FLOAT, &HALF];
-    for (profile, collisions) in
-        profiles.into_iter().flat_map(|of| piles.iter().map(move |it| (of, it)))
-    {
+    for profile in profiles {
         let limits = Limits::roomy(profile.default_variant());
         let said = |bodies: &Vec<Body>, collisions: &Vec<Collision>| {
             let (good, valid) =
@@ -232,7 +138,7 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
             good
         };
         assert!(said(&bodies, collisions));
-        for at in [0, CHECKED - 1, CHECKED, 2 * CHECKED] {
+        for at in [0, BLOCK - 1, BLOCK, 2 * BLOCK] {
             let mut wrong = collisions.clone();
             let last = wrong[at].count as usize - 1;
             wrong[at].contacts[last].distance = f32::INFINITY;
@@ -244,7 +150,6 @@ fn a_good_scene_is_good_and_one_wrong_number_is_not() {
     }
 }
 
-/// A block with padding among its collisions takes a second check, on another path.
 #[test]
 fn what_is_wrong_beside_padding_is_noticed() {
     let body = |shape| Body { pose: POSE, velocity: Velocity::default(), shape };
@@ -267,12 +172,12 @@ fn what_is_wrong_beside_padding_is_noticed() {
     for profile in PROFILES {
         let limits = Limits::roomy(profile.default_variant());
         let said_of = |wrong: Option<Collision>, at: usize, empty: &[usize]| {
-            let mut collisions = [COLLISION, on_ground].repeat(CHECKED);
+            let mut collisions = [COLLISION, on_ground].repeat(BLOCK);
             if let Some(wrong) = wrong {
                 collisions[at] = wrong;
             }
             let mut entries: Vec<Option<u32>> =
-                (0..u32::try_from(2 * CHECKED).expect("few")).map(Some).collect();
+                (0..u32::try_from(2 * BLOCK).expect("few")).map(Some).collect();
             empty.iter().for_each(|at| entries.insert(*at, None));
             let schedule: Schedule = entries.into_iter().collect();
             said(&limits, &bodies, &collisions, Some(&schedule)).expect("nothing else wrong")
@@ -285,9 +190,9 @@ fn what_is_wrong_beside_padding_is_noticed() {
         for (at, empty) in [
             (50, &[][..]),
             (50, &[40]),
-            (0, &[0, 1, 52, CHECKED + 30, 2 * CHECKED]),
-            (CHECKED + 20, &[40]),
-            (CHECKED + 20, &[CHECKED + 30]),
+            (0, &[0, 1, 52, BLOCK + 30, 2 * BLOCK]),
+            (BLOCK + 20, &[40]),
+            (BLOCK + 20, &[BLOCK + 30]),
         ] {
             assert!(said(None, at, empty), "{} {empty:?}", profile.name);
             for (what, wrong) in wrongs {

@@ -1,24 +1,20 @@
 //! Reads the results out of the channels' beats.
 //!
 //! The memory may be slow to read, so each beat is read once, and the sum and the check for finite
-//! numbers are made on the way. Whole units come first ([`stripe_reader`]). The rest at a segment's
-//! end, and a stripe that no profile has, come beat by beat.
+//! numbers are made on the way.
 
-use pgs_interface::number::StreamFormat;
 use pgs_interface::record::{Beat, result};
 
-use super::stripe_reader::{self, Tally};
-use crate::beat::format::{Format, in_format};
-use crate::beat::pack::pattern::Pattern;
-use crate::beat::pack::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
-use crate::beat::stripe::{Deal, Layout, total};
-use crate::record::finite::Finite;
-use crate::record::result::Record;
-use crate::simd::{Lanes, Vectors, Work, in_wide_vectors};
+use super::deal::{Joiner, sum_of_words};
+use super::format::rows_of;
+use super::pool::{ChannelChunks, PackPool, PieceRead, whole_read};
+use super::stripe::{BLOCK, Layout};
+use crate::record::result::{Record, all_finite};
 
 /// Reads the results of all records from the result segments, one a channel, on several threads if
-/// the records are many; the sum as [`Reader::finish`] gives it, and whether all numbers are
-/// finite.
+/// the records are many; the sum of all 32-bit words of the segments, modulo 2^32, padding
+/// included, which the accelerator computes of the words that it sends; and whether all numbers are
+/// finite. A number that the accelerator could not hold is not finite.
 ///
 /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
 pub(crate) fn read_all(
@@ -27,118 +23,33 @@ pub(crate) fn read_all(
     records: &mut [Record],
     packers: &mut PackPool,
 ) -> (u32, bool) {
-    let (mut sum, mut all_finite) = (0_u32, true);
+    let (mut sum, mut good) = (0_u32, true);
     let count = records.len();
     let cut = |size| {
         let (mut pieces, all) = (ChannelChunks::new(layout, size, whole_read(channels)), records);
         all.chunks_mut(size).map(move |records| (records, pieces.cut()))
     };
-    let work = |(records, piece): (&mut [Record], PieceRead<'_>)| {
-        let mut reader = Reader::new(layout, &piece);
-        let finite = reader.read(records);
-        (reader.finish(), finite)
-    };
+    let work = |(records, piece): (&mut [Record], PieceRead<'_>)| read(layout, piece, records);
     packers.each(count, cut, work, |(of_range, finite)| {
         sum = sum.wrapping_add(of_range);
-        all_finite &= finite;
+        good &= finite;
     });
-    (sum, all_finite)
+    (sum, good)
 }
 
-/// Reads results from the result segments, one a channel.
-///
-/// A number that the accelerator could not hold is not finite.
-pub(crate) struct Reader<'a> {
-    /// The beats that are not read yet.
-    channels: PieceRead<'a>,
-    format: StreamFormat,
-    /// The pattern of the stripe, if a profile has it, and its first channel.
-    pattern: Option<(Pattern, usize)>,
-    deal: Deal,
-    sum: Lanes,
-}
-
-impl<'a> Reader<'a> {
-    /// Begins with the first record.
-    ///
-    /// Shape: each channel is as long as [`Layout::beats_on_channel`] says.
-    pub(crate) fn new(layout: &Layout, channels: &[&'a [Beat]]) -> Self {
-        Self {
-            channels: whole_read(channels),
-            format: layout.format,
-            pattern: Pattern::of(layout.stripe.streams),
-            deal: Deal::new(layout.stripe),
-            sum: Lanes::all(0),
-        }
+/// Reads a range of results, otherwise as [`read_all`].
+fn read(layout: &Layout, channels: PieceRead<'_>, records: &mut [Record]) -> (u32, bool) {
+    let (mut sum, mut good) = (0_u32, true);
+    let mut joiner = Joiner::new(layout.stripe, channels);
+    let mut buffer = [Beat::default(); BLOCK * result::ROWS];
+    for block in records.chunks_mut(BLOCK) {
+        let beats = &mut buffer[..layout.beats(block.len())];
+        joiner.read(beats);
+        sum = sum.wrapping_add(sum_of_words(beats));
+        rows_of(layout.format, beats, block.as_flattened_mut());
+        good &= all_finite(block);
     }
-
-    /// Reads the next records; whether all their numbers are finite.
-    pub(crate) fn read(&mut self, records: &mut [Record]) -> bool {
-        in_wide_vectors(Reading { reader: self, records })
-    }
-
-    #[inline(always)]
-    fn read_as<V: Vectors, F: Format>(&mut self, vectors: V, records: &mut [Record]) -> bool {
-        let mut tally = Tally { sum: self.sum, finite: Finite::new() };
-        let done = match self.pattern {
-            Some((pattern, first)) if self.deal.at_end_of_group() => {
-                let rest = self.channels.get_mut(first..).unwrap_or_default();
-                stripe_reader::read::<V, F>(pattern, vectors, rest, records, &mut tally)
-            }
-            _ => 0,
-        };
-        // The units did not take these records.
-        for record in records.iter_mut().skip(done) {
-            let mut beats = [Beat::default(); result::ROWS];
-            let beats = &mut beats[..result::ROWS / F::PER_BEAT];
-            for beat in &mut *beats {
-                *beat = self.take();
-            }
-            *record = tally.record::<V, F>(vectors, beats);
-        }
-        self.sum = tally.sum;
-        tally.finite.all()
-    }
-
-    /// The next beat.
-    fn take(&mut self) -> Beat {
-        let channel = &mut self.channels[self.deal.next()];
-        let (beat, behind) = channel.split_at(1);
-        *channel = behind;
-        beat[0]
-    }
-
-    /// The sum of all 32-bit words of the segments, modulo 2^32, padding included. The accelerator
-    /// computes the same sum of the words that it sends.
-    pub(crate) fn finish(self) -> u32 {
-        total(self.channels.iter().copied().flatten().fold(self.sum, plus))
-    }
-}
-
-/// The read of some records. It is compiled for the vectors of this processor.
-struct Reading<'r, 'a> {
-    reader: &'r mut Reader<'a>,
-    records: &'r mut [Record],
-}
-
-impl Work for Reading<'_, '_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<V: Vectors>(self, vectors: V) -> bool {
-        let Self { reader, records } = self;
-        in_format!(reader.format, F => reader.read_as::<V, F>(vectors, records))
-    }
-}
-
-/// Sum of all 32-bit words, modulo 2^32.
-pub(crate) fn sum_of_words(beats: &[Beat]) -> u32 {
-    total(beats.iter().fold(Lanes::all(0), plus))
-}
-
-/// Adds a beat word by word, modulo 2^32.
-fn plus(sum: Lanes, beat: &Beat) -> Lanes {
-    sum.plus((*beat).into())
+    (sum, good)
 }
 
 #[cfg(test)]
@@ -146,12 +57,11 @@ mod tests {
     use pgs_interface::address_map::DMA_COUNT_MAX;
     use pgs_interface::record::LANES;
     use pgs_interface::stripe::Stripe;
-    use pgs_support::chunks::Chunks;
 
     use super::*;
     use crate::beat::stripe::{Place, Segment};
-    use crate::record::finite::finite;
     use crate::record::result::decode;
+    use crate::record::result::finite;
     use crate::scene::{Pose, Velocity};
     use pgs_interface::number::StreamFormat;
     use pgs_interface::profile::{HALF, PROFILES};
@@ -159,10 +69,10 @@ mod tests {
 
     /// Everything that a reader reads, and the sum.
     fn read(layout: &Layout, channels: &[&[Beat]], count: usize) -> (Vec<(Pose, Velocity)>, u32) {
-        let mut reader = Reader::new(layout, channels);
         let mut records = vec![Record::default(); count];
-        assert_eq!(reader.read(&mut records), records.iter().all(finite));
-        (records.iter().map(decode).collect(), reader.finish())
+        let (sum, good) = read_all(layout, channels, &mut records, &mut PackPool::alone());
+        assert_eq!(good, records.iter().all(finite));
+        (records.iter().map(decode).collect(), sum)
     }
 
     /// Word by word, in 64 bits.
@@ -204,7 +114,8 @@ mod tests {
                     segments[layout.place(beat).channel].extend(beats);
                 }
                 let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
-                Reader::new(&layout, &views).read(&mut [Record::default(); COUNT])
+                let records = &mut [Record::default(); COUNT];
+                read_all(&layout, &views, records, &mut PackPool::alone()).1
             };
             for at in 0..COUNT * result::ROWS * LANES {
                 let beside = [3, 11, 15].contains(&(at % 16));
@@ -227,10 +138,11 @@ mod tests {
             let half = &mut bytemuck::cast_slice_mut::<_, u16>(&mut beats)[16 + at];
             *half = word;
             let [a, b, c, d, e, f] = beats;
-            let channels = [[a, b, f], [c, d, Beat::default()], [e; 3]];
-            let views = [&channels[0][..], &channels[1][..2], &channels[2][..1]];
+            let none = Beat::default();
+            let channels = [[a, b, f, none], [c, d, none, none], [e, none, none, none]];
+            let views = [&channels[0][..], &channels[1][..], &channels[2][..2]];
             let mut records = [Record::default(); 3];
-            Reader::new(&layout, &views).read(&mut records)
+            read_all(&layout, &views, &mut records, &mut PackPool::alone()).1
         };
         assert!(good(0, 0x7BFF) && good(0, 0xFBFF));
         for word in [0x7C00, 0xFC00, 0x7C01, 0x7FFF, 0xFFFF] {
@@ -275,8 +187,11 @@ mod tests {
             let lane = |at: usize| u32::from(halves[2 * at]) | u32::from(halves[2 * at + 1]) << 16;
             segments[index % 5 / 2].push(Beat([0, 1, 2, 3].map(lane)));
         }
-        let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
         let layout = Segment::Results.layout(&HALF.default_variant());
+        for (channel, segment) in segments.iter_mut().enumerate() {
+            segment.resize(layout.beats_on_channel(words.len(), channel), Beat::default());
+        }
+        let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
         let (states, sum) = read(&layout, &views, words.len());
         assert_eq!(sum, sum_of(&segments));
         for (expected, (pose, velocity)) in words.iter().zip(states) {
@@ -315,12 +230,10 @@ mod tests {
             read_sixteen_bit_results(&words);
         }
 
-        /// Covers the stripes of the profiles and others, in every format, with reads of any
-        /// length.
+        /// Covers the stripes of the profiles and others, in every format.
         #[test]
-        fn every_split_reads_what_the_definition_says(
-            words in prop::collection::vec(any::<[u32; 16]>(), 0..40),
-            blocks in prop::collection::vec(0_usize..12, 0..12),
+        fn every_result_is_read_where_the_definition_says(
+            words in prop::collection::vec(any::<[u32; 16]>(), 0..200),
             streams in prop::sample::select(
                 PROFILES.iter().map(|profile| profile.stripes.results.streams)
                     .chain([&[1, 0][..], &[0, 1, 1], &[3, 2, 1, 0, 0, 1], &[2], &[1, 2, 3]])
@@ -334,7 +247,8 @@ mod tests {
             let mut segments: Vec<Vec<Beat>> = (0..DMA_COUNT_MAX)
                 .map(|channel| vec![Beat::default(); layout.beats_on_channel(count, channel)])
                 .collect();
-            let mut beats = words.iter().flat_map(|record| record.split_arrays().0).map(|it| Beat(*it));
+            let rows = words.iter().flat_map(|record| record.as_chunks().0);
+            let mut beats = rows.map(|row| Beat(*row));
             for at in 0..layout.beats(count) {
                 let Place { channel, slot } = layout.place(at);
                 // Padding may hold any words.
@@ -349,23 +263,17 @@ mod tests {
                         return beat;
                     }
                     let halves: [u16; 8] = bytemuck::cast(beat);
-                    let halves = halves.split_arrays::<LANES>().0[row % 2];
+                    let halves = halves.as_chunks::<LANES>().0[row % 2];
                     Beat(halves.map(number))
                 }))
                 .collect();
 
             let views: Vec<&[Beat]> = segments.iter().map(Vec::as_slice).collect();
-            let mut reader = Reader::new(&layout, &views);
             let mut found = vec![Record::default(); count];
-            let mut rest = found.as_mut_slice();
-            for block in blocks.into_iter().chain([count]) {
-                let (block, behind) = rest.split_at_mut(block.min(rest.len()));
-                let good = reader.read(block);
-                prop_assert_eq!(good, block.iter().all(finite));
-                rest = behind;
-            }
+            let (sum, good) = read_all(&layout, &views, &mut found, &mut PackPool::alone());
+            prop_assert_eq!(good, found.iter().all(finite));
             prop_assert_eq!(found, expected);
-            prop_assert_eq!(reader.finish(), sum_of(&segments));
+            prop_assert_eq!(sum, sum_of(&segments));
         }
 
         #[test]

@@ -1,44 +1,37 @@
 //! Measures a schedule: hazards, lost updates, empty entries, bodies alive, spans.
 
-use pgs_support::float_env::standard;
-
-use super::{IssueWindow, OrderError, OrderInput, Schedule};
+use zynq_pgs::order::{IssueWindow, OrderInput, Schedule};
 
 /// The cost of a schedule on hardware with a given window.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct OrderReport {
+pub(super) struct OrderReport {
     /// Entries with a collision.
-    pub collisions: usize,
+    pub(super) collisions: usize,
     /// Entries without a collision.
-    pub empty: usize,
+    pub(super) empty: usize,
     /// Issue slots.
-    pub slots: usize,
+    pub(super) slots: usize,
     /// Collisions that share a moving body with one of the `depth - 1` issue slots before, or with
     /// one before in its own slot: without an interlock they read a stale velocity.
-    pub hazards: usize,
+    pub(super) hazards: usize,
     /// Write-backs that a later write-back of the same body overwrites without having read them:
     /// without an interlock these impulses are lost.
-    pub lost_updates: usize,
+    pub(super) lost_updates: usize,
     /// Most moving bodies alive in one issue slot. A body is alive from its first use to its last.
-    pub most_alive: usize,
+    pub(super) most_alive: usize,
     /// Longest span of a moving body, from its first use to its last, issue slots.
-    pub longest_span: usize,
+    pub(super) longest_span: usize,
     /// Mean span of the moving bodies that are used, issue slots.
-    pub mean_span: f64,
+    pub(super) mean_span: f64,
 }
 
 impl OrderReport {
-    /// Measures a schedule of the input's collisions.
-    ///
-    /// # Errors
-    /// [`OrderError`]: the input cannot be ordered, or an entry names a collision that is not
-    /// there.
-    pub fn measure(
+    /// Measures a schedule of the collisions of an input that the driver has checked.
+    pub(super) fn measure(
         schedule: &Schedule,
         input: &OrderInput<'_>,
         window: IssueWindow,
-    ) -> Result<Self, OrderError> {
+    ) -> Self {
         let depth = window.depth() as usize;
         let mut last: Vec<Option<usize>> = vec![None; input.moving.len()];
         let (mut hazards, mut lost_updates) = (0, 0);
@@ -50,13 +43,13 @@ impl OrderReport {
             }
             hazards += usize::from(stale > 0);
             lost_updates += stale;
-        })?;
+        });
         let spans = || lives.iter().flatten().map(|(first, last)| last - first);
         let used = spans().count();
         let total: usize = spans().sum();
         let slots = schedule.len().div_ceil(window.per_issue() as usize);
         let curve = curve(&lives, slots);
-        Ok(Self {
+        Self {
             collisions: schedule.collisions(),
             empty: schedule.empty(),
             slots,
@@ -65,37 +58,32 @@ impl OrderReport {
             most_alive: curve.into_iter().max().unwrap_or(0) as usize,
             longest_span: spans().max().unwrap_or(0),
             mean_span: share(total, used),
-        })
+        }
     }
 
     /// Share of the collisions that meet a hazard, 0 to 1.
-    #[must_use]
-    pub fn hazard_share(&self) -> f64 {
+    pub(super) fn hazard_share(&self) -> f64 {
         share(self.hazards, self.collisions)
     }
 
     /// Empty entries per collision.
-    #[must_use]
-    pub fn empty_share(&self) -> f64 {
+    pub(super) fn empty_share(&self) -> f64 {
         share(self.empty, self.collisions)
     }
 }
 
 /// Moving bodies alive in each issue slot (thesis, figure 4.13).
-///
-/// # Errors
-/// As [`OrderReport::measure`].
-pub fn live_curve(
+pub(super) fn live_curve(
     schedule: &Schedule,
     input: &OrderInput<'_>,
     window: IssueWindow,
-) -> Result<Vec<u32>, OrderError> {
-    let lives = lives(schedule, input, window.per_issue(), |_, _| ())?;
-    Ok(curve(&lives, schedule.len().div_ceil(window.per_issue() as usize)))
+) -> Vec<u32> {
+    let lives = lives(schedule, input, window.per_issue(), |_, _| ());
+    curve(&lives, schedule.len().div_ceil(window.per_issue() as usize))
 }
 
 fn share(part: usize, whole: usize) -> f64 {
-    if whole == 0 { 0.0 } else { standard(|| part as f64 / whole as f64) }
+    if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
 }
 
 /// First and last slot of each moving body that is used. Calls `each` with every collision's slot
@@ -105,15 +93,11 @@ fn lives(
     input: &OrderInput<'_>,
     per_issue: u32,
     mut each: impl FnMut(usize, &mut dyn Iterator<Item = u32>),
-) -> Result<Vec<Option<(usize, usize)>>, OrderError> {
-    input.check()?;
+) -> Vec<Option<(usize, usize)>> {
     let mut lives: Vec<Option<(usize, usize)>> = vec![None; input.moving.len()];
     for (entry, found) in schedule.iter().enumerate() {
         let Some(found) = found else { continue };
-        let Some(pair) = input.pairs.get(found as usize) else {
-            let collisions = input.pairs.len();
-            return Err(OrderError::NoSuchCollision { entry, found, collisions });
-        };
+        let pair = &input.pairs[found as usize];
         let slot = entry / per_issue as usize;
         // A collision without contact points has no bodies.
         let moves = |body: &u32| input.moving.get(*body as usize) == Some(&true);
@@ -124,7 +108,7 @@ fn lives(
         }
         each(slot, &mut moving.into_iter());
     }
-    Ok(lives)
+    lives
 }
 
 /// Bodies alive in each slot.
@@ -152,13 +136,12 @@ mod tests {
     const INPUT: OrderInput<'static> = OrderInput {
         pairs: &[[0, 1], [1, 2], [3, 4], [0, 3]],
         moving: &[false, true, true, true, true],
-        positions: &[[0.0; 3]; 5],
     };
 
     fn measured(entries: &[Option<u32>], depth: u32, per_issue: u32) -> OrderReport {
         let schedule: Schedule = entries.iter().copied().collect();
         let window = IssueWindow::new(depth, per_issue).expect("a window");
-        OrderReport::measure(&schedule, &INPUT, window).expect("a schedule")
+        OrderReport::measure(&schedule, &INPUT, window)
     }
 
     #[test]
@@ -191,7 +174,7 @@ mod tests {
         let input = OrderInput { pairs: &[[1, 2], [2, 1]], ..INPUT };
         let schedule: Schedule = [Some(0), Some(1)].into_iter().collect();
         let window = IssueWindow::new(2, 1).expect("a window");
-        let report = OrderReport::measure(&schedule, &input, window).expect("a schedule");
+        let report = OrderReport::measure(&schedule, &input, window);
         assert_eq!((report.hazards, report.lost_updates), (1, 2));
     }
 
@@ -199,7 +182,7 @@ mod tests {
     fn the_curve_counts_a_body_from_its_first_use_to_its_last() {
         let schedule: Schedule = [Some(0), Some(2), Some(1), None, Some(3)].into_iter().collect();
         let window = IssueWindow::new(1, 1).expect("a window");
-        let curve = live_curve(&schedule, &INPUT, window).expect("a schedule");
+        let curve = live_curve(&schedule, &INPUT, window);
         // 1: slots 0 to 2, 2: slot 2, 3: slots 1 to 4, 4: slot 1.
         assert_eq!(curve, [1, 3, 3, 1, 1]);
     }

@@ -13,14 +13,13 @@ use pgs_interface::address_map::DMA_COUNT_MAX;
 use pgs_interface::record::Beat;
 use pgs_support::Crew;
 
-use crate::beat::stripe::BLOCK;
-use crate::beat::stripe::Layout;
+use super::stripe::{BLOCK, Layout};
 use crate::platform::{acquire_from_device, release_to_device};
 
 /// Records of a range. A range is short enough that the last thread does not keep the others
 /// waiting, and long enough that handing it out costs next to nothing. A segment of one range is
 /// not worth another thread.
-pub(crate) const RANGE: usize = 68 * BLOCK;
+pub(crate) const RANGE: usize = 34 * BLOCK;
 const _: () = assert!(RANGE.is_multiple_of(BLOCK));
 /// Limit of the default number of threads: a few threads saturate the memory.
 const UNASKED: usize = 4;
@@ -43,7 +42,7 @@ impl PackPool {
     }
 
     /// The caller's thread alone.
-    #[cfg(any(test, feature = "bench"))]
+    #[cfg(test)]
     pub(crate) const fn alone() -> Self {
         Self::new(Some(1))
     }

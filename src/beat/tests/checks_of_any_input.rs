@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::screen::{BODIES, said};
+use super::checks::{BODIES, said};
 use crate::order::Schedule;
 use crate::scene::{Body, Collision, Contact, Pose, Velocity};
 use crate::validate::Limits;

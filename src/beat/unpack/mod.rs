@@ -1,4 +1,0 @@
-//! Beats to results: the stripes of the channels, joined and read.
-
-pub(crate) mod results;
-pub(crate) mod stripe_reader;
