@@ -6,7 +6,7 @@
 #        tools/scripts/rtl-test.sh steps       instead, the driver's whole steps through registers and DMA:
 #                                              all recorded ones, and faults; then 500 random steps against
 #                                              the model, and 500 among register accesses in lock step, with
-#                                              either form of inertia, and with an issue queue
+#                                              either form of inertia; and 500 with gaps and stalls
 #        tools/scripts/rtl-test.sh mutations   instead, seeded mistakes in the Verilog: each must be found
 #        tools/scripts/rtl-test.sh --help
 #
@@ -45,7 +45,7 @@ if [ "$mode" = '' ]; then
 	attend "$built/rtlgen" schedule --inertia world
 fi
 
-# Both hazard modes, world inertia, and an issue queue, are built side by side.
+# Both hazard modes, and world inertia, are built side by side. Interlocked builds have an issue queue.
 simulations=()
 begin "$built/rtlgen" simulator --out "$folder/interlocked"
 simulations+=($!)
@@ -53,11 +53,9 @@ begin "$built/rtlgen" simulator --out "$folder/unchecked" --hazards unchecked
 simulations+=($!)
 begin "$built/rtlgen" simulator --out "$folder/world" --inertia world
 simulations+=($!)
-begin "$built/rtlgen" simulator --out "$folder/queued" --queue 64
-simulations+=($!)
 for process in "${simulations[@]}"; do await "$process"; done
 world=$folder/world/pgs-rtl
-queued=(--simulator "$folder/queued/pgs-rtl" --queue 64)
+queued=(--simulator "$folder/interlocked/pgs-rtl")
 
 recorded=(tests/golden/*/)
 simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
@@ -72,9 +70,7 @@ if [ "$mode" = steps ]; then
 		attend "$built/cosim" random "${cosim[@]}" --cases 500 --seed 5000000
 		attend "$built/cosim" registers "${cosim[@]}" --cases 500
 	done
-	attend "$built/cosim" random "${queued[@]}" --cases 500 --seed 5000000
 	attend "$built/cosim" random "${queued[@]}" --cases 500 --seed 6000000 --gaps 300 --stalls 700
-	attend "$built/cosim" registers "${queued[@]}" --cases 500
 	# The longest part comes last.
 	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
 	exit
@@ -88,8 +84,6 @@ for hazards in interlocked unchecked; do
 	random+=($!)
 done
 begin "$built/cosim" random --simulator "$world" --inertia world --cases $((cases / 2))
-random+=($!)
-begin "$built/cosim" random "${queued[@]}" --cases "$cases"
 random+=($!)
 for process in "${random[@]}"; do await "$process"; done
 for hazards in interlocked unchecked; do
@@ -105,13 +99,7 @@ attend "$built/cosim" errors "${cosim[@]}"
 attend "$built/cosim" full "${cosim[@]}"
 attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
 attend "$built/cosim" random "${cosim[@]}" --cases $((cases / 10)) --seed 1000000 --gaps 300 --stalls 700
-attend "$built/cosim" recorded "${queued[@]}" "${recorded[@]}"
-attend "$built/cosim" errors "${queued[@]}"
-attend "$built/cosim" full "${queued[@]}"
 attend "$built/cosim" crowded "${queued[@]}"
-attend "$built/cosim" registers "${queued[@]}" --cases $((cases / 4))
-attend "$built/cosim" random "${queued[@]}" --cases $((cases / 5)) --seed 1000000 --gaps 300 --stalls 700
-attend "$built/cosim" full "${queued[@]}" --gaps 300 --stalls 700
 # Without the interlock the bits depend on the time at which beats come.
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
 	--gaps 300 --stalls 700

@@ -51,7 +51,7 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_enum, default_value_t = Hazards::Interlocked)]
     hazards: Hazards,
     /// Collisions that wait in the issue queue; 0: no queue. Only an interlocked build can have one
-    /// [default: 0]
+    /// [default: the profile's, 64; unchecked 0]
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u32).range(0..=i64::from(QUEUE_MAX)))]
     queue: Option<u32>,
