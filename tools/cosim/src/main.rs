@@ -26,8 +26,9 @@ use pgs_interface::profile::Inertia;
 use pgs_interface::register::Register;
 use rtlgen::design::{Design, Parameters};
 use rtlgen::emit::{self, File};
+use rtlgen::ending::without_result;
+use rtlgen::simulator;
 use rtlgen::simulator::Waveform;
-use rtlgen::{simulator, verify};
 use step_folder::folder::Folder;
 
 /// Runs the generated Verilog beside the model, beat by beat.
@@ -209,26 +210,13 @@ enum Verb {
     },
 }
 
-const USAGE: u8 = 2;
-const SKIPPED: u8 = 77;
-
 type Failure = Box<dyn Error>;
 
 fn main() -> ExitCode {
     let mut out = io::stdout().lock();
     let done = act(&Cli::parse().verb, &mut out);
     let Err(error) = done else { return done.unwrap_or(ExitCode::SUCCESS) };
-    if let Some(missing @ verify::Error::Missing { .. }) = error.downcast_ref() {
-        eprintln!("skipped: {missing}");
-        return ExitCode::from(SKIPPED);
-    }
-    eprintln!("error: {error}");
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        eprintln!("  because: {error}");
-        cause = error.source();
-    }
-    ExitCode::from(USAGE)
+    without_result(error.as_ref())
 }
 
 fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {

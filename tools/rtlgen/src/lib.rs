@@ -7,6 +7,7 @@
 
 pub mod design;
 pub mod emit;
+pub mod ending;
 pub mod equations;
 pub mod graph;
 pub mod operators;

@@ -1,13 +1,11 @@
 //! Command line of the hardware generator. `--help` lists the verbs.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stderr, reason = "a program says what it does")]
 
-use std::error::Error as _;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use rtlgen::verify;
+use rtlgen::ending::without_result;
 
 mod verbs;
 
@@ -42,11 +40,6 @@ enum Verb {
     Sincos(verbs::sincos::Sincos),
 }
 
-/// Wrong usage, or an error that keeps a verb from its result.
-const USAGE: u8 = 2;
-/// A tool that the verb needs is not installed. Test runners take it as skipped.
-const SKIPPED: u8 = 77;
-
 fn main() -> ExitCode {
     let mut out = io::stdout().lock();
     let done = match Cli::try_parse() {
@@ -61,19 +54,8 @@ fn main() -> ExitCode {
         Err(verbs::Error::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => {
             ExitCode::SUCCESS
         }
-        Err(verbs::Error::Verify(error @ verify::Error::Missing { .. })) => {
-            eprintln!("skipped: {error}");
-            ExitCode::from(SKIPPED)
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            let mut cause = error.source();
-            while let Some(error) = cause {
-                eprintln!("  because: {error}");
-                cause = error.source();
-            }
-            ExitCode::from(USAGE)
-        }
+        Err(verbs::Error::Verify(error)) => without_result(&error),
+        Err(error) => without_result(&error),
     }
 }
 

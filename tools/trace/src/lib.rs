@@ -16,7 +16,6 @@ use bitstream_model::RegisterAccess;
 use bitstream_model::recording::{Recording, Span};
 use zynq_pgs::StepReport;
 
-pub use a53::{A53_COPIES, a53_copy_seconds};
 pub use events::SCHEMA;
 
 /// A step that was recorded.

@@ -13,7 +13,6 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command")]
 
-mod a53;
 mod callgrind;
 mod solver;
 
@@ -54,8 +53,6 @@ enum Section {
     Solver,
     /// Instructions of the yardstick, counted by valgrind
     Instructions,
-    /// Cost of packing on a Cortex-A53, on paper (docs/a53-cost.md)
-    A53,
 }
 
 impl Options {
@@ -81,11 +78,8 @@ fn run(options: &Options) -> Outcome {
     if let Some(only) = options.only {
         return callgrind::run(only, options.profile.as_deref(), &options.step()?);
     }
-    let sections: [(Section, Measure); 3] = [
-        (Section::Solver, solver::measure),
-        (Section::Instructions, callgrind::measure),
-        (Section::A53, a53::measure),
-    ];
+    let sections: [(Section, Measure); 2] =
+        [(Section::Solver, solver::measure), (Section::Instructions, callgrind::measure)];
     for (section, measure) in sections {
         if options.section.is_none_or(|wanted| wanted == section) {
             measure(options)?;

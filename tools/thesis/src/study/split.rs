@@ -178,14 +178,10 @@ fn respond(scene: &Scene, parameters: &StepParameters) -> Result<Duration> {
     spent(|| measured_response(&mut yardstick))
 }
 
-// `tools/scripts/a53-split.sh` counts the instructions of both functions by their names.
-
-#[inline(never)]
 fn measured_search(scene: &mut Scene) {
     scene.detect();
 }
 
-#[inline(never)]
 fn measured_response(yardstick: &mut Yardstick) {
     yardstick.solve();
 }
