@@ -2,7 +2,7 @@
 //!
 //! `validate` makes one pass over the bodies and one over the collisions. A board of the same
 //! capacities accepts every step that passes. Packing checks each record as it writes it, by the
-//! same rules without words ([`Scene::accepts`], [`Scene::accepts_body`], and a limit on all
+//! same rules without words (`Scene::accepts`, `Scene::accepts_body`, and a limit on all
 //! numbers), and calls `validate` only for the error of input that it refuses.
 
 mod body;
