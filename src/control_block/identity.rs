@@ -175,10 +175,10 @@ pub(crate) fn identify(window: &Window) -> Result<Capabilities, IdentityError> {
         profile.world.is_some() || !features::WORLD_INERTIA.is_set(word)
     })?;
     let interlocked = features::INTERLOCKED.is_set(able);
-    let queue =
-        checked(window, &QUEUE, "0 to 256, and 0 where the pipeline does not wait", |depth| {
-            depth <= if interlocked { QUEUE_MAX } else { 0 }
-        })?;
+    let longest = if interlocked && profile.has_queue() { QUEUE_MAX } else { 0 };
+    let queue = checked(window, &QUEUE, "0 to 256, and 0 where no build has a queue", |depth| {
+        depth <= longest
+    })?;
     let world = features::WORLD_INERTIA.is_set(able);
     let variant = Variant {
         profile,

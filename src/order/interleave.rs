@@ -11,8 +11,8 @@
 //! the scene. An issue queue keeps apart the hazards that are left (interface specification,
 //! hazards).
 
-/// Collisions of a window: their records are 1 MB, as large as the second-level cache of the board's
-/// processor.
+/// Collisions of a window: their records are 1 MB, as large as the second-level cache of the
+/// board's processor.
 const WINDOW: usize = 8192;
 /// Most streams of a window: twice the hazard window of `float` in issue slots, and a little more.
 const STREAMS_MAX: usize = 340;

@@ -17,7 +17,7 @@ pub struct Place {
     /// Its index among the collisions of that step; `u32::MAX` for a new collision.
     pub collision: u32,
     /// For each contact point its index among the points that the collision had; 255 for a new
-    /// point. Elements behind the number of points count for nothing.
+    /// point. Elements from the number of points on have no effect, but must be valid, too.
     pub points: [u8; CONTACT_POINTS],
 }
 
@@ -175,14 +175,18 @@ impl LastStep {
     ///
     /// # Errors
     /// [`InputError::OtherImpulses`]: another number of impulses than of collisions, as where the
-    /// step did not give any out. What was committed before stays.
+    /// step did not give any out. [`InputError::UnequalLengths`]: arrays of collisions of other
+    /// lengths. What was committed before stays.
     pub fn commit<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,
         impulses: &[Impulses],
     ) -> Result<(), InputError> {
+        if !collisions.lengths_agree() {
+            return Err(InputError::UnequalLengths { what: "collisions" });
+        }
         let (found, expected) = (impulses.len(), collisions.len());
-        if found != expected || !collisions.lengths_agree() {
+        if found != expected {
             return Err(InputError::OtherImpulses { found, expected });
         }
         let kept =

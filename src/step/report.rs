@@ -65,14 +65,14 @@ pub enum Limit {
 #[non_exhaustive]
 pub enum OrderChoice {
     /// The caller chose: [`StepParameters::order`](crate::StepParameters::order) names the order,
-    /// or the caller wrote the collisions one after the other.
+    /// the parameters ask to verify it, or the caller wrote the collisions one after the other.
     Asked,
     /// The board does not wait on hazards. Only an order without hazards is solved right.
     NoInterlock,
     /// The board has an issue queue, which keeps hazards apart.
     Queue,
-    /// The board waits on hazards, and has no queue. This order takes the fewest cycles of two: the order as given
-    /// and the order without hazards.
+    /// The board waits on hazards, and has no queue. This order takes the fewest cycles of two: the
+    /// order as given and the order without hazards.
     Cheapest(OrderCosts),
 }
 
@@ -84,7 +84,9 @@ pub struct StepReport {
     pub bodies: u64,
     /// Number of collisions with contact points.
     pub collisions: u64,
-    /// The order in which the collisions were sent.
+    /// The order in which the collisions were sent. Collisions that were
+    /// [written](crate::Accelerator::write) are sent as given, also through the queue
+    /// ([`Self::queued`]).
     pub order: Order,
     /// Whether the collisions went through the board's issue queue, which solves them in another
     /// order where they meet hazards.

@@ -24,7 +24,8 @@ impl Accelerator {
     /// records go straight into the memory that the board reads, and the caller needs no array of
     /// them.
     ///
-    /// The board solves them in the order in which they are written. The parameters must ask for
+    /// The board takes them in the order in which they are written, and solves them in this order,
+    /// too, unless it has an issue queue and no order is named. The parameters must ask for
     /// [`Order::AsGiven`](crate::order::Order::AsGiven), or for no order on a bitstream that waits
     /// on hazards. A step that is to verify its order wants all collisions at once.
     ///
@@ -68,6 +69,7 @@ impl Accelerator {
     ///
     /// # Errors
     /// [`Error::Input`] as [`Self::step`], and [`InputError::WrittenInOrder`],
+    /// [`InputError::WrittenWarm`],
     /// [`InputError::MoreThanAnnounced`]. [`Error::Step`] if memory is too small for `announced`
     /// collisions, or the step was cancelled; [`Error::MustReopen`] after a fault that could not be
     /// cleared.

@@ -4,7 +4,7 @@
 usage: a53_step.py PGS PLUGIN [--quick] [FOLDER]
 
 PGS is the aarch64 build, PLUGIN is a53/plugin.c as a library. A step of a scene is the difference of two runs of
-`pgs run`, one of which has a step more. FOLDER is a step in arrays, solved once, cold. --quick leaves all scenes but
+`pgs run`; the second has one step more. FOLDER is a step in arrays, solved once, cold. --quick leaves all scenes but
 the smallest out, and holds what the driver takes against its budget.
 """
 import json

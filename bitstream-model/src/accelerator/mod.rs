@@ -1,7 +1,7 @@
 //! The emulated accelerator: beats in, beats out.
 //!
 //! ```text
-//! streams -> records/segment.rs -> records/decode.rs -> queue.rs, hazards.rs -> solver.rs -> velocities
+//! streams -> records/segment.rs -> records/decode.rs -> queue.rs or hazards.rs -> solver.rs
 //!                                       integrate.rs -> records/results.rs -> streams
 //! ```
 //!

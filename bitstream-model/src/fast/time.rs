@@ -1,9 +1,9 @@
 //! The clock cycles of a step without its beats: a segment takes as long as the larger of its work
 //! and its transfer.
 //!
-//! While a pass empties its issue queue and drains its pipeline, and while it works longer than its transfer takes, the next
-//! segment's beats fill the FIFOs. The same collisions come in every pass of a kind, so stalls are
-//! counted once for each kind.
+//! While a pass empties its issue queue and drains its pipeline, and while it works longer than its
+//! transfer takes, the next segment's beats fill the FIFOs. The same collisions come in every pass
+//! of a kind, so stalls are counted once for each kind.
 
 use crate::accelerator::hazards::{Entry, Pipeline};
 use crate::accelerator::records::striping::PerStream;

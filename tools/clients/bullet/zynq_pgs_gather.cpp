@@ -12,6 +12,7 @@ const btScalar SAME_NORMAL = btScalar(0.999);
 const uint32_t STATIC_SHAPE = 0;
 // The numbers of storePlaces in a point, which begin again behind the last.
 const uint64_t STORES = uint64_t(1) << 30;
+static_assert(sizeof(void *) == 8, "a place takes 64 bits of the user data of a point");
 
 void store(float *to, const btVector3 &vector) {
     for (int i = 0; i < 3; i++) to[i] = float(vector[i]);

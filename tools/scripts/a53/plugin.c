@@ -159,13 +159,12 @@ static void decode_vector(Instruction *in, uint32_t word) {
     }
   } else if ((word >> 24 & 0x1F) == 0x0E && (word >> 21 & 1) && (word >> 10 & 1)) { // three of the same kind
     unsigned operation = word >> 11 & 0x1F;
-    bool upper = word >> 29 & 1, second_half = word >> 23 & 1;
+    bool upper = word >> 29 & 1;
     if (operation >= 0x18) in->latency = FLOAT;
     if (operation == 0x1B && upper) in->unit = MULTIPLY;
     if (operation == 0x19 && !upper) in->unit = FUSED, in->latency = 2 * FLOAT, in->from[2] = d;
     if (operation == 0x1F && upper) in->unit = DIVIDE, in->latency = wide ? 40 : 13, in->busy = wide ? 37 : 10;
     if (operation == 3 && upper && (word >> 22 & 3)) in->from[2] = d; // BSL, BIT, BIF
-    (void)second_half;
   } else if ((word >> 24 & 0x1F) == 0x0E && (word >> 17 & 0x1F) == 0x10 && (word >> 10 & 3) == 2) { // two of a kind
     in->from[1] = NONE, in->latency = FLOAT;
     if ((word >> 12 & 0x1F) == 0x1F) in->unit = DIVIDE, in->latency = wide ? 38 : 12, in->busy = wide ? 35 : 9; // FSQRT

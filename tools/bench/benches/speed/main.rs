@@ -1,4 +1,4 @@
-//! The emulated board beside a solver on the CPU, and packing on a Cortex-A53, on paper.
+//! The emulated board beside a solver on the CPU.
 //!
 //! ```sh
 //! cargo bench --bench speed
