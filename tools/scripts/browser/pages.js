@@ -102,15 +102,18 @@ async function report(page, { screenshot }) {
 			const svg = figure.querySelector("svg");
 			const { width, height } = svg.getBoundingClientRect();
 			const drawn = svg.querySelectorAll("polyline, path, rect, circle, polygon").length;
-			return { id: figure.id, width, height, drawn, caption: figure.querySelector("figcaption").textContent };
+			// A picture of the scene lies in the page as one image.
+			const pictured = svg.querySelector("image[href^='data:image/png']")?.getAttribute("href").length ?? 0;
+			return { id: figure.id, width, height, drawn, pictured, caption: figure.querySelector("figcaption").textContent };
 		}),
 		rows: Array.from(document.querySelectorAll("table.index tbody tr"), row =>
 			Array.from(row.cells, cell => cell.textContent.trim())),
 		lost: Array.from(document.querySelectorAll("a[href^='#']"), link => link.hash.slice(1))
 			.filter(id => !document.getElementById(id)),
 	}));
-	for (const { id, width, height, drawn, caption } of found.figures) {
-		assert.ok(width > 300 && height > 100 && drawn > 3, `${id} is drawn: ${width} x ${height}, ${drawn} shapes`);
+	for (const { id, width, height, drawn, pictured, caption } of found.figures) {
+		const size = `${width} x ${height}, ${drawn} shapes, an image of ${pictured} characters`;
+		assert.ok(width > 300 && height > 100 && (drawn > 3 || pictured > 10_000), `${id} is drawn: ${size}`);
 		assert.ok(caption.length > 10, `${id} has a caption`);
 	}
 	const ids = found.figures.map(figure => figure.id);
