@@ -62,6 +62,11 @@ impl OrderingContext<'_> {
     }
 }
 
+/// Fewer collisions than this go past the queue, in the cheaper of the caller's order and the one
+/// without hazards, unless the caller names an order. They never fill the queue, cost the processor
+/// little to order, and are often a stack, which stands best if it is solved from the ground up.
+const FEW: usize = 64;
+
 impl Ordering {
     /// Orders the collisions of a step. Its lengths and parameters were validated before; the
     /// indices in bodies and collisions were not, and are checked here.
@@ -86,6 +91,9 @@ impl Ordering {
                 // Nothing is sent, and the number of collisions was compared with no room.
                 if bodies.len() == 0 {
                     return Ok(OrderSummary::as_given(choice, false));
+                }
+                if choice == OrderChoice::Queue && collisions.len() < FEW {
+                    return self.cheapest(bodies, collisions, parameters, context);
                 }
                 let queued = context.capabilities.queue > 0;
                 self.orderer.interleave(collisions.len());

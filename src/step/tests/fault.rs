@@ -267,7 +267,7 @@ fn an_error_of_the_accelerator_names_the_stream_or_the_collision() {
     tampered.tamper(CONTROL_BLOCK, 0x184, Tamper::Value(17));
     let error = failed(&tampered, &mut accelerator);
     let text = fault_of(&error).to_string();
-    assert!(text.contains("collision 11 (sent as entry 17)"), "{text}");
+    assert!(text.contains("collision 17 (sent as entry 17)"), "{text}");
     recovered(&mut accelerator, &error);
 
     tampered.tamper(CONTROL_BLOCK, 0x180, Tamper::Value(0xEE));

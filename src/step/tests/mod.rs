@@ -409,7 +409,10 @@ fn a_queue_whose_numbers_are_no_permutation_fails_the_step_and_changes_nothing()
     let queue = Some(64);
     let board = EmulatedBoard::new(BoardConfig { queue, ..BoardConfig::default() });
     let (tampered, mut accelerator) = Tampered::on(&board.expect("a board that can be built"));
-    let parameters = StepParameters::default().with_impulses_out(true);
+    let parameters = StepParameters {
+        order: Some(crate::order::Order::Interleaved),
+        ..StepParameters::default().with_impulses_out(true)
+    };
     let (mut bodies, collisions) = scene(20);
     accelerator.step(&mut bodies, &collisions, &parameters).expect("a step");
     let (before, impulses) = (bits(&bodies), accelerator.impulses().to_vec());

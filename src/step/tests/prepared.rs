@@ -123,7 +123,7 @@ fn the_next_step_is_on_the_board_while_results_are_read() {
     assert_eq!(bits(&bodies), undisturbed(CUBES));
     assert!(board.is_running());
     let report = report.expect("a good step");
-    assert_eq!((report.bodies, report.cycles.total), (u64::from(CUBES) + 1, 4_147));
+    assert_eq!((report.bodies, report.cycles.total), (u64::from(CUBES) + 1, 3_827));
     assert_ends(started.expect("it started"), OTHER, "the next");
     assert_eq!(board.violations(), []);
 }
