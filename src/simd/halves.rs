@@ -49,22 +49,23 @@ mod aarch64 {
 
     #[inline(always)]
     pub(super) fn narrow(row: Beat) -> [u16; 4] {
-        // SAFETY: the vector is four f32, of any bits.
+        // SAFETY: a beat and the vector have four words of 32 bits, sixteen bytes, and the vector may
+        // hold any bits.
         let wide = unsafe { std::mem::transmute::<Beat, float32x4_t>(row) };
         // SAFETY: every aarch64 that Linux runs on has the instruction.
         let narrow = unsafe { vcvt_f16_f32(wide) };
-        // SAFETY: the vector is four words of sixteen bits.
+        // SAFETY: both have four words of sixteen bits, eight bytes, and a word may hold any bits.
         unsafe { std::mem::transmute::<float16x4_t, [u16; 4]>(narrow) }
     }
 
     #[inline(always)]
     pub(super) fn widen(words: [u16; 4]) -> Beat {
-        // SAFETY: both are four words of sixteen bits, eight bytes, and the vector may hold any
+        // SAFETY: both have four words of sixteen bits, eight bytes, and the vector may hold any
         // bits.
         let narrow = unsafe { std::mem::transmute::<[u16; 4], float16x4_t>(words) };
         // SAFETY: every aarch64 that Linux runs on has the instruction.
         let wide = unsafe { vcvt_f32_f16(narrow) };
-        // SAFETY: both are four words of 32 bits, sixteen bytes, and a beat may hold any bits.
+        // SAFETY: both have four words of 32 bits, sixteen bytes, and a beat may hold any bits.
         unsafe { std::mem::transmute::<float32x4_t, Beat>(wide) }
     }
 }

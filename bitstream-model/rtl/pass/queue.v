@@ -3,8 +3,8 @@
 //
 //   taken by the finder -> a slot -> last uses, pairs, timer -> enters -> free -> issues
 //
-// A record keeps its slot. A few slots more than the depth hold those that come; a record is a candidate
-// from its entry on. Two matrices have a bit for each pair of slots: which one is older, and whether they
+// A record keeps its slot from the finder to its issue. There are a few more slots than the depth, for
+// records that have not entered yet. A record may issue once it has entered. Two matrices have a bit for each pair of slots: which one is older, and whether they
 // have a moving body in common. With them no number of a body lies on the way from one decision to the
 // next one:
 //

@@ -40,7 +40,7 @@ module queue_hazard #(
 );
   localparam [7:0] SLOTS = WINDOW;
 
-  reg  [COLLISION-1:0] issued, over;          // issues of the pass; those that are over
+  reg  [COLLISION-1:0] issued, over;          // issues of the pass; issues whose write-back can be read
   reg  [WINDOW-2:0]    under_way;             // one bit a slot, the newest in bit 0
   reg  [7:0]           slot;                  // number of the slot, modulo 256
   reg  [COLLISION:0]   early_use, last_a_s3, last_b_s3;

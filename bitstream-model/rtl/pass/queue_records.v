@@ -43,7 +43,7 @@ module queue_records #(
 );
   localparam [SLOT-1:0] LAST = SLOTS - 1;
 
-  // At first each slot in turn, then those that become free.
+  // The slots are given out in turn first; after that, each slot that an issue has left.
   reg  [SLOT-1:0] fresh;
   reg             none_fresh;
   wire [SLOT-1:0] freed, loading;

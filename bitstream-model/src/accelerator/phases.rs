@@ -463,7 +463,7 @@ impl Accelerator {
         self.checked(count, bodies).map(Some).map_err(wrong)
     }
 
-    /// The velocities that a collision writes back; its impulses are those after the pass.
+    /// The velocities that a collision writes back; its impulses are the values after the pass.
     #[inline]
     fn solved<R: Format, U: Format, I: inertia::Inertia>(
         &mut self,

@@ -59,8 +59,8 @@ pub(crate) struct Queue {
     slot: u64,
     /// The slot from which on the bodies of the oldest collision are left to it.
     patient_until: u64,
-    /// Collisions that met a hazard, and behind them the ones that nobody has looked at, each in the
-    /// order of the stream: most slots look at one collision.
+    /// Collisions that met a hazard, in the order of the stream. The fresh ones stand behind them in
+    /// the stream, and no slot has looked at one yet: most slots look at one collision.
     blocked: Vec<Waiting>,
     fresh: VecDeque<Waiting>,
     /// A slot before which each of the blocked ones cannot issue, and one for all of them.
@@ -313,9 +313,9 @@ mod tests {
         assert_eq!(hazards, [1, 2, 3, 4, 5]);
     }
 
-    /// Number 1 needs bodies 0 and 1, of which the others take one in turn: body 0 in slots 0, 3,
-    /// 6, 9 and 12, body 1 in slots 1, 4, 7 and 10. It is the oldest from slot 1 on, so that in
-    /// slot 13, four windows later, body 1 is left to it; body 0 is free again in slot 15.
+    /// Collision 1 needs bodies 0 and 1. The other collisions take body 0 in slots 0, 3, 6, 9 and
+    /// 12, and body 1 in slots 1, 4, 7 and 10. Collision 1 is the oldest from slot 1 on. In slot 13,
+    /// four windows later, no other collision may take body 1. Body 0 is free again in slot 15.
     #[test]
     fn alternating_pairs_do_not_starve_a_collision_beyond_its_patience() {
         let mut pairs = vec![[0, 2], [0, 1]];

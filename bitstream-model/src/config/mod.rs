@@ -110,7 +110,7 @@ pub struct BoardConfig {
     /// Behaviour on read-after-write hazards.
     pub hazards: Hazards,
     /// Depth of the issue queue in collisions, 0 for none, instead of the profile's. Only an
-    /// interlocked design of which [`Profile::queue`] knows can have one.
+    /// interlocked design whose profile [has a queue](Profile::has_queue) can have one.
     pub queue: Option<u32>,
     /// Hazard window of both solvers in issue slots, instead of the profile's cycles.
     pub window_slots: Option<u32>,

@@ -1,5 +1,5 @@
-//! Assigns each collision to a block, in the order of issue: the first with an empty lane behind all
-//! earlier collisions of its moving bodies.
+//! Assigns each collision to a block, in the order of issue: the first block with an empty lane
+//! behind all earlier collisions of its moving bodies.
 //!
 //! So the collisions of a body lie in different blocks in the order in which they issue, and taking
 //! block after block gives the bits of taking collision after collision. In hazard-free order the

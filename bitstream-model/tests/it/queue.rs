@@ -93,8 +93,8 @@ fn impulses_leave_in_the_order_of_issue_with_the_numbers_behind_each_four() {
 
 #[test]
 fn a_hub_stalls_for_the_window_in_every_pass_and_filling_is_work() {
-    // Three collisions of one body with the ground. The window of all passes is 162 slots, of which
-    // a pass idles in 161 twice; three slots fill the queue.
+    // Three collisions of one body with the ground. The window of all passes is 162 slots: a pass
+    // idles in 161 slots twice. Three slots fill the queue.
     let step = Step::on_ground(1, 3);
     let outcome = Machine::new(queued(64)).step(&step).expect("the step completes");
     assert_eq!(outcome.stalls, 8 * 2 * 161 * 2);

@@ -257,7 +257,7 @@ fn measure(
     let bytes = match thing {
         Thing::Bodies => of_bodies,
         Thing::AsGiven => of_bodies + of_collisions,
-        // Beside the collisions of every pass, those of the warm passes are few.
+        // The warm passes have few collisions beside the other passes.
         Thing::InOrder | Thing::Warm => of_bodies + of_entries,
         Thing::Unpack | Thing::Commit => Unpacker::bytes(bodies.len()),
     };

@@ -77,7 +77,7 @@ mod tests {
         let mut warm = WarmStart::default();
         warm.commit(&old, &impulses).expect("one for each");
         let mut new = [[0, 1], [0, 3], [1, 3], [2, 7], [2, 9], [3, 4]].map(collision);
-        // Its points in reverse order, of which the first has moved by a little.
+        // Its points are in reverse order, and the first one has moved by a little.
         new[3].contacts.reverse();
         new[3].contacts[0].point[1] = 0.04;
         // Too far away.
