@@ -74,12 +74,6 @@ REASONS: dict[tuple[str, str], str] = {
         "tools/rtlgen/src/equations/contact.rs",
         "tools/rtlgen/src/equations/friction.rs",
     ): "the inputs of the two kinds of pass",
-    ("tools/scene/src/build.rs", "tools/scene/src/spheres.rs"): "two public scenes with shapes and bodies",
-    (
-        "tools/thesis/src/study/determinism/mod.rs",
-        "tools/thesis/src/study/half/mod.rs",
-    ): "the form of an experiment and its arguments",
-    ("tools/thesis/src/study/split.rs", "tools/thesis/src/study/time_step/mod.rs"): "likewise",
 }
 
 

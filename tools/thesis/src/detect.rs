@@ -8,7 +8,7 @@ use scene::{Scene, penetration};
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Collision, Contact};
 
-use crate::experiment::{Boards, Experiment, Part, given};
+use crate::experiment::{Boards, Experiment, Measure, Part};
 use crate::session::Session;
 use crate::study::given::GivenStep;
 use crate::table::{Cell, Table, text};
@@ -30,14 +30,12 @@ The exit code is 1 if a pair deeper than 1 mm is missing or extra. Normals are t
 degrees, points up to 1 mm. docs/command-line.md tells where Bullet's have another place, and why.";
 
 /// The experiment.
-pub(crate) static DETECTION: Experiment = Experiment {
-    id: "detection",
-    thesis: "§2.2.2",
-    about: "Our collision detection beside a folder's collisions of the same poses",
-    boards: Boards::None,
-    arguments: DetectionArgs::augment_args,
-    run: |args, session| measure(&given(args)?, session),
-};
+pub(crate) static DETECTION: Experiment = Experiment::of::<DetectionArgs>(
+    "detection",
+    "§2.2.2",
+    Boards::None,
+    "Our collision detection beside a folder's collisions of the same poses",
+);
 
 /// Its arguments.
 #[derive(Debug, Clone, Args)]
@@ -48,40 +46,42 @@ pub(crate) struct DetectionArgs {
     input: PathBuf,
 }
 
-/// Detects, and compares.
-fn measure(args: &DetectionArgs, session: &Session) -> Result<Part> {
-    let path = args.input.display().to_string();
-    let step = GivenStep::folder(&args.input)?;
-    let mut scene = Scene::of_cubes(&step.bodies).map_err(|error| {
-        Failure::input(error)
-            .about(&path)
-            .next("`pgs thesis detection --help` tells which bodies it takes")
-    })?;
-    check(&step, session)?;
-    let collisions = step.collisions.iter().filter(|collision| collision.count > 0);
-    let theirs: Vec<(Pair, &Collision)> = collisions.map(|each| (pair(each), each)).collect();
-    let compared = Comparison::of(scene.detect(), &theirs.iter().copied().collect());
-    if compared.theirs < theirs.len() {
-        return Err(Failure::input(format!("{path}: two collisions have the same bodies"))
-            .next("join the two"));
-    }
-    let mut part = compared.part();
-    part.fact("input", path);
-    let depth = penetration(scene.collisions());
-    let collisions = format!(
-        "{} of {} bodies, {} of them with the ground; {} points, {} of them penetrating, {} mm \
+impl Measure for DetectionArgs {
+    /// Detects, and compares.
+    fn measure(&self, session: &Session) -> Result<Part> {
+        let path = self.input.display().to_string();
+        let step = GivenStep::folder(&self.input)?;
+        let mut scene = Scene::of_cubes(&step.bodies).map_err(|error| {
+            Failure::input(error)
+                .about(&path)
+                .next("`pgs thesis detection --help` tells which bodies it takes")
+        })?;
+        check(&step, session)?;
+        let collisions = step.collisions.iter().filter(|collision| collision.count > 0);
+        let theirs: Vec<(Pair, &Collision)> = collisions.map(|each| (pair(each), each)).collect();
+        let compared = Comparison::of(scene.detect(), &theirs.iter().copied().collect());
+        if compared.theirs < theirs.len() {
+            return Err(Failure::input(format!("{path}: two collisions have the same bodies"))
+                .next("join the two"));
+        }
+        let mut part = compared.part();
+        part.fact("input", path);
+        let depth = penetration(scene.collisions());
+        let collisions = format!(
+            "{} of {} bodies, {} of them with the ground; {} points, {} of them penetrating, {} mm \
          deep at most",
-        grouped(scene.collisions().len() as u64),
-        grouped(scene.bodies().len() as u64),
-        grouped(scene.ground_pairs() as u64),
-        grouped(depth.contacts),
-        grouped(depth.penetrating),
-        number(depth.largest * 1e3),
-    );
-    part.fact("collisions", collisions);
-    let [unmatched, points] = [compared.unmatched, compared.our_points].map(grouped);
-    part.fact("unmatched", format!("{unmatched} of our {points} points"));
-    Ok(part)
+            grouped(scene.collisions().len() as u64),
+            grouped(scene.bodies().len() as u64),
+            grouped(scene.ground_pairs() as u64),
+            grouped(depth.contacts),
+            grouped(depth.penetrating),
+            number(depth.largest * 1e3),
+        );
+        part.fact("collisions", collisions);
+        let [unmatched, points] = [compared.unmatched, compared.our_points].map(grouped);
+        part.fact("unmatched", format!("{unmatched} of our {points} points"));
+        Ok(part)
+    }
 }
 
 /// Lets the driver refuse collisions that are none; nobody looks at the solution.

@@ -6,9 +6,9 @@
 //! | share within 1 % | all components | is within if the new one is 0 too |
 //! | absolute difference, \|new - original\| | all components | counts like any other |
 
-use serde::{Serialize, Serializer};
-use serde_json::{Value, json};
 use zynq_pgs::{Body, Shape};
+
+use crate::table::{Cell, Table, text};
 
 /// Relative deviation up to which two numbers count as the same.
 const ONE_PERCENT: f64 = 0.01;
@@ -20,8 +20,6 @@ pub(crate) struct Deviation {
     pub(crate) components: u64,
     /// Components whose original is 0.
     pub(crate) zeros: u64,
-    /// Components whose original is 0 and whose new value is not.
-    pub(crate) zeros_moved: u64,
     /// Mean relative deviation where the original is not 0.
     pub(crate) mean: f64,
     /// Largest relative deviation where the original is not 0.
@@ -52,7 +50,6 @@ impl Deviation {
             }
             if original == 0.0 {
                 found.zeros += 1;
-                found.zeros_moved += u64::from(difference > 0.0);
                 continue;
             }
             let relative = difference / original.abs();
@@ -79,37 +76,13 @@ impl Deviation {
     pub(crate) fn within_share(&self) -> f64 {
         share(self.within, self.components)
     }
-
-    /// For programs; relative numbers in percent.
-    pub(crate) fn to_json(self) -> Value {
-        json!({
-            "components": self.components,
-            "original_zero": self.zeros,
-            "original_zero_new_not": self.zeros_moved,
-            "relative_mean_percent": self.mean * 100.0,
-            "relative_largest_percent": self.largest * 100.0,
-            "under_1_percent_share": self.under_share(),
-            "within_1_percent_share": self.within_share(),
-            "absolute_mean": self.mean_absolute,
-            "absolute_largest": self.largest_absolute,
-        })
-    }
-}
-
-impl Serialize for Deviation {
-    /// As [`to_json`](Self::to_json).
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.to_json().serialize(serializer)
-    }
 }
 
 /// The deviations between two states of the same bodies, for moving bodies only.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct StateDeviation {
     pub(crate) position: Deviation,
-    #[serde(rename = "linear_velocity")]
     pub(crate) linear: Deviation,
-    #[serde(rename = "angular_velocity")]
     pub(crate) angular: Deviation,
 }
 
@@ -123,6 +96,77 @@ impl StateDeviation {
             linear: of(|body| body.velocity.linear),
             angular: of(|body| body.velocity.angular),
         }
+    }
+}
+
+/// The relative deviations of the components whose original is not 0, percent, in ascending order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Deviations(Vec<f64>);
+
+/// Powers of ten by quarters of the exponent.
+const QUARTERS: [f64; 4] =
+    [1.0, 1.778_279_410_038_922_8, 3.162_277_660_168_379_5, 5.623_413_251_903_491];
+/// Decades of a curve from 1e-6 %: an f32 changes by 6e-6 % at least.
+const DECADES: [f64; 12] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5];
+/// Deviations of a table, percent.
+const EDGES: [(&str, &str, f64); 7] = [
+    ("below_1e_4_percent", "below\n1e-4 %", 1e-4),
+    ("below_1e_3_percent", "\n1e-3 %", 1e-3),
+    ("below_1e_2_percent", "\n0.01 %", 0.01),
+    ("below_1e_1_percent", "\n0.1 %", 0.1),
+    ("below_1_percent", "\n1 %", 1.0),
+    ("below_10_percent", "\n10 %", 10.0),
+    ("below_100_percent", "\n100 %", 100.0),
+];
+
+impl Deviations {
+    /// Of pairs (original, new) of finite numbers.
+    pub(crate) fn of(pairs: impl IntoIterator<Item = (f32, f32)>) -> Self {
+        let pairs = pairs.into_iter().map(|(original, new)| (f64::from(original), f64::from(new)));
+        let pairs = pairs.filter(|(original, _)| *original != 0.0);
+        let percent = pairs.map(|(original, new)| (new - original).abs() / original.abs() * 100.0);
+        let mut all: Vec<f64> = percent.collect();
+        all.sort_unstable_by(f64::total_cmp);
+        Self(all)
+    }
+
+    /// All of several ones.
+    pub(crate) fn merged<'a>(each: impl Iterator<Item = &'a Self>) -> Self {
+        let mut all: Vec<f64> = each.flat_map(|one| one.0.iter().copied()).collect();
+        all.sort_unstable_by(f64::total_cmp);
+        Self(all)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The share of the numbers that deviate by less, percent.
+    fn below_edge(&self, edge: f64) -> f64 {
+        let below = self.0.partition_point(|deviation| *deviation < edge);
+        100.0 * below as f64 / (self.0.len() as f64).max(1.0)
+    }
+
+    /// The shares of the numbers that deviate by less, four points a decade, up to all of them.
+    pub(crate) fn below(&self) -> Vec<(f64, f64)> {
+        let edges = DECADES.iter().flat_map(|decade| QUARTERS.map(|quarter| decade * quarter));
+        let points: Vec<_> = edges.map(|edge| (edge, self.below_edge(edge))).collect();
+        let some = points.iter().filter(|(edge, _)| self.0.last().is_some_and(|most| edge <= most));
+        let needed = some.count() + 1;
+        points.into_iter().take(needed).collect()
+    }
+
+    /// A table with a row for each of these.
+    pub(crate) fn table(rows: &[(&str, &Self)]) -> Table {
+        let columns: Vec<_> =
+            [("of", "of")].into_iter().chain(EDGES.map(|(key, head, _)| (key, head))).collect();
+        let title = "Positions after the last step that deviate by less, % of them";
+        let mut table = Table::with_columns("positions", title, &columns);
+        for (name, of) in rows.iter().filter(|(_, of)| !of.is_empty()) {
+            let shares = EDGES.map(|(.., edge)| Cell::Number(of.below_edge(edge), 4));
+            table.row([text(*name)].into_iter().chain(shares));
+        }
+        table
     }
 }
 
@@ -221,7 +265,7 @@ mod tests {
     #[test]
     fn a_zero_is_left_out_of_what_is_relative_and_within_only_as_zero() {
         let d = Deviation::of([(0.0, 0.0), (-0.0, 0.0), (0.0, 3.0), (1.0, 1.0)]);
-        assert_eq!((d.components, d.zeros, d.zeros_moved), (4, 3, 1));
+        assert_eq!((d.components, d.zeros), (4, 3));
         near(d.mean, 0.0);
         near(d.under_share(), 1.0);
         near(d.within_share(), 0.75);
@@ -259,13 +303,27 @@ mod tests {
         near(unmoved_share(&a, &b, &[false, false], |number| number), 0.0);
     }
 
+    #[test]
+    fn shares_below_rise_to_all_numbers_and_leave_out_zeros() {
+        let found = Deviations::of([(1.0, 1.0), (0.0, 5.0), (1.0, 1.005), (1.0, 1.5)]);
+        let points = found.below();
+        assert!(points.windows(2).all(|pair| pair[0].1 <= pair[1].1));
+        let at =
+            |edge: f64| points.iter().find(|point| point.0 >= edge * 0.999).expect("an edge").1;
+        near(at(0.1), 100.0 / 3.0);
+        near(at(1.0), 200.0 / 3.0);
+        near(points.last().expect("an edge").1, 100.0);
+        assert_eq!(Deviations::merged([&found, &found].into_iter()).below(), points);
+        assert_eq!(Deviations::of([(0.0, 1.0)]).below(), [(1e-6, 0.0)]);
+    }
+
     proptest! {
         #[test]
         fn numbers_do_not_deviate_from_themselves(
             numbers in prop::collection::vec(-1e30_f32..1e30, 0..50)
         ) {
             let d = Deviation::of(numbers.iter().map(|&number| (number, number)));
-            prop_assert_eq!((d.under, d.within, d.zeros_moved), (d.nonzero(), d.components, 0));
+            prop_assert_eq!((d.under, d.within), (d.nonzero(), d.components));
             let sum = d.mean + d.largest + d.mean_absolute + d.largest_absolute;
             prop_assert_eq!(sum.to_bits(), 0.0_f64.to_bits());
         }

@@ -3,11 +3,10 @@
 use std::io::Write;
 use std::path::Path;
 
-use clap::{ArgMatches, Command, FromArgMatches};
+use clap::{ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::facts::fact;
 use pgs_command::output::width::stdout_width;
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
@@ -16,7 +15,7 @@ use crate::session::Session;
 use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
-pub(crate) const SCHEMA: u32 = 3;
+pub(crate) const SCHEMA: u32 = 4;
 
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
@@ -45,6 +44,24 @@ pub(crate) struct Experiment {
     pub(crate) arguments: fn(Command) -> Command,
     /// Measures or computes; the matches are of its arguments.
     pub(crate) run: fn(&ArgMatches, &Session) -> Result<Part>,
+}
+
+/// Arguments that measure or compute what they ask for.
+pub(crate) trait Measure: Args {
+    fn measure(&self, session: &Session) -> Result<Part>;
+}
+
+impl Experiment {
+    /// An experiment with these arguments.
+    pub(crate) const fn of<A: Measure>(
+        id: &'static str,
+        thesis: &'static str,
+        boards: Boards,
+        about: &'static str,
+    ) -> Self {
+        let run = |matches: &ArgMatches, session: &Session| given::<A>(matches)?.measure(session);
+        Self { id, thesis, about, boards, arguments: A::augment_args, run }
+    }
 }
 
 /// The arguments of an experiment.
@@ -84,12 +101,6 @@ impl Part {
     /// The part of an experiment that Ctrl-C ended before its first figure.
     pub(crate) fn interrupted() -> Self {
         Self { agrees: true, data: json!({}), ..Self::default() }
-    }
-
-    /// Takes the members for programs from an outcome.
-    pub(crate) fn with(mut self, outcome: &impl Serialize) -> Self {
-        self.data = serde_json::to_value(outcome).unwrap_or_else(|_| json!({}));
-        self
     }
 
     /// Adds a figure, and the rows of the index that lead to it.
@@ -140,6 +151,8 @@ impl Part {
         document["experiment"] = experiment.id.into();
         document["thesis"] = experiment.thesis.into();
         document["complete"] = self.complete.into();
+        let fact = |(label, text): &(&str, String)| json!({ "label": label, "text": text });
+        document["facts"] = self.facts.iter().map(fact).collect();
         document["tables"] = self.tables.iter().map(Table::to_json).collect();
         document["figures"] = self.figures.iter().map(Figure::to_json).collect();
         document["index"] = self.rows.iter().map(Row::to_json).collect();

@@ -11,7 +11,6 @@ mod experiment;
 mod figure;
 mod formats;
 mod formulas;
-mod histogram;
 mod index;
 mod narrow;
 mod order;

@@ -13,9 +13,6 @@ pub(crate) enum NarrowFormat {
     /// The thesis' own format taken literally: three bits of the exponent are cut out, and reading
     /// guesses them from the bit before.
     Thesis16Literal,
-    /// A sign, `exponent` bits for the exponents up to `top`, and the other bits for the mantissa;
-    /// cut off as in the thesis' format, and as there small magnitudes become the smallest one.
-    Split { exponent: u32, top: i32 },
 }
 
 impl NarrowFormat {
@@ -34,7 +31,6 @@ impl NarrowFormat {
             Self::Binary16 => StreamFormat::Binary16.name(),
             Self::Thesis16 => "thesis16",
             Self::Thesis16Literal => "thesis16-literal",
-            Self::Split { .. } => "split",
         }
     }
 
@@ -44,7 +40,6 @@ impl NarrowFormat {
         let largest = match self {
             Self::Binary16 | Self::Thesis16 => StreamFormat::Binary16.largest(),
             Self::Thesis16Literal => return Some(literal(value)),
-            Self::Split { exponent, top } => return split(exponent, top, value),
         };
         if value.is_nan() || value.abs() > largest {
             return None;
@@ -62,7 +57,7 @@ const EXPONENT_MIN: i32 = -14;
 const MANTISSA: i32 = 10;
 
 /// Exponent of a magnitude that is a normal f32.
-pub(crate) fn exponent(value: f32) -> i32 {
+fn exponent(value: f32) -> i32 {
     i32::from((value.to_bits() >> 23 & 0xFF) as u8) - 127
 }
 
@@ -90,32 +85,6 @@ fn thesis16(value: f32) -> f32 {
 pub(crate) fn carried(format: Option<NarrowFormat>, value: f32) -> f32 {
     let taken = |_: &NarrowFormat| value.abs() <= StreamFormat::Binary16.largest();
     format.filter(taken).and_then(|format| format.round_trip(value)).unwrap_or(value)
-}
-
-/// Bits of a number behind its sign.
-const BEHIND_SIGN: u32 = 15;
-/// Bits of an f32's mantissa.
-const F32_MANTISSA: u32 = 23;
-
-/// The exponent of the smallest number of a split; f32 has no normal number below.
-pub(crate) fn lowest_exponent(bits: u32, top: i32) -> i32 {
-    let lowest = top.saturating_add(1).saturating_sub_unsigned(1 << bits.min(BEHIND_SIGN));
-    lowest.max(f32::MIN_EXP - 1)
-}
-
-/// Cut off, and not below the smallest number.
-fn split(bits: u32, top: i32, value: f32) -> Option<f32> {
-    let is_small = exponent(value) < lowest_exponent(bits, top);
-    if value.is_nan() || exponent(value) > top {
-        return None;
-    }
-    if is_small {
-        #[allow(clippy::cast_possible_truncation, reason = "a power of two in the range of f32")]
-        let smallest = 2.0_f64.powi(lowest_exponent(bits, top)) as f32;
-        return Some(smallest.copysign(value));
-    }
-    let cut = F32_MANTISSA.saturating_sub(BEHIND_SIGN.saturating_sub(bits));
-    Some(f32::from_bits(value.to_bits() >> cut << cut))
 }
 
 /// Keeps the f32's sign, the top bit and the four low bits of the exponent, and ten bits of the
@@ -203,28 +172,7 @@ mod tests {
         assert_eq!(of(2.0_f32.powi(17)), Some(2.0));
     }
 
-    #[test]
-    fn a_split_takes_bits_from_the_exponent_for_the_mantissa() {
-        let of = |exponent, value| bits(NarrowFormat::Split { exponent, top: 3 }, value);
-        // Five bits leave ten for the mantissa, four leave eleven.
-        let value = 1.0 + 1.0 / 1024.0 + 1.0 / 2048.0;
-        assert_eq!(of(5, value), Some(f32::to_bits(1.0 + 1.0 / 1024.0)));
-        assert_eq!(of(4, value), Some(value.to_bits()));
-        // Four bits reach from 2^-12 to just below 16.
-        assert_eq!(of(4, 0.0), Some(2.0_f32.powi(-12).to_bits()));
-        assert_eq!(of(4, -1e-9), Some((-(2.0_f32.powi(-12))).to_bits()));
-        assert_eq!(of(4, 2.0_f32.powi(-12)), Some(2.0_f32.powi(-12).to_bits()));
-        assert_eq!((of(4, 15.0), of(4, 16.0)), (Some(15.0_f32.to_bits()), None));
-        assert_eq!(of(8, f32::NAN), None);
-    }
-
     proptest! {
-        #[test]
-        fn a_split_of_five_and_ten_bits_is_the_format_of_the_thesis(value in 3.1e-5_f32..65_504.0) {
-            let split = NarrowFormat::Split { exponent: 5, top: 15 };
-            prop_assert_eq!(bits(split, value), bits(NarrowFormat::Thesis16, value));
-        }
-
         #[test]
         fn between_its_limits_the_literal_format_is_ours(value in 3.1e-5_f32..65_504.0, minus: bool) {
             let value = if minus { -value } else { value };

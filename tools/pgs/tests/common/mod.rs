@@ -95,6 +95,21 @@ pub(crate) fn near(value: &Value, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found}, expected {expected}");
 }
 
+/// The rows of a table of an experiment's document.
+pub(crate) fn rows<'a>(document: &'a Value, id: &str) -> &'a [Value] {
+    let tables = document["tables"].as_array().expect("tables");
+    let table = tables.iter().find(|table| table["id"] == id);
+    let table = table.unwrap_or_else(|| panic!("no table {id}: {document:#}"));
+    table["rows"].as_array().expect("rows")
+}
+
+/// The row of a side in the table of steps.
+pub(crate) fn at<'a>(document: &'a Value, step: u64, side: &str) -> &'a Value {
+    let found =
+        rows(document, "steps").iter().find(|row| row["step"] == step && row["side"] == side);
+    found.unwrap_or_else(|| panic!("no step {step} of {side}: {document:#}"))
+}
+
 /// A path as an argument.
 pub(crate) fn text(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{pgs, run};
+use crate::common::{at, pgs, run};
 use serde_json::Value;
 
 pub(crate) fn root() -> PathBuf {
@@ -251,9 +251,9 @@ fn bitstream<'a>(page: &'a str, profile: &str) -> Vec<&'a str> {
     row.trim_matches('|').split('|').map(str::trim).collect()
 }
 
-/// A share, as the table has it.
+/// Percent, as the table has it.
 fn percent(share: &Value) -> String {
-    format!("{:.1} %", 100.0 * share.as_f64().expect("a share"))
+    format!("{:.1} %", share.as_f64().expect("a share"))
 }
 
 #[test]
@@ -266,26 +266,14 @@ fn the_table_of_bitstreams_holds_what_its_commands_measure() {
         "the command"
     );
     assert!(words.contains("ends with seven times the kinetic energy"), "what it ends with");
-    let last = |profile: &str| {
-        let command =
-            format!("thesis compare float {profile} --grid 12x10x12 --drop 5 --steps 120");
-        let ran = run(command.split(' ').chain(["--json"]));
-        assert_eq!(ran.code, Some(0), "{command}: {}", ran.stderr);
-        let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");
-        document["rows"].as_array().and_then(|rows| rows.last()).expect("rows").clone()
-    };
-    {
-        let profile = "half";
-        let row = last(profile);
-        let velocities = percent(&row["difference"]["linear_velocity"]["within_1_percent_share"]);
-        let still = percent(&row["b"]["unmoved_share"]);
-        assert_eq!(bitstream(&page, profile)[5..], [velocities, still], "{profile}");
-        let still = percent(&row["a"]["unmoved_share"]);
-        assert_eq!(bitstream(&page, "float")[5..], [String::new(), still], "float");
-        if profile == "half" {
-            let [a, b] = ["a", "b"].map(|lane| row[lane]["kinetic_energy_j"].as_f64());
-            let times = b.expect("J") / a.expect("J");
-            assert!((6.5..7.5).contains(&times), "{times}");
-        }
-    }
+    let command = "thesis compare float half --grid 12x10x12 --drop 5 --steps 120 --json";
+    let ran = run(command.split(' '));
+    assert_eq!(ran.code, Some(0), "{command}: {}", ran.stderr);
+    let document: Value = serde_json::from_str(&ran.stdout).expect("one JSON document");
+    let [float, half] = ["A", "B"].map(|side| at(&document, 120, side));
+    let [velocities, still] = ["linear_within_1_percent", "unmoved_percent"];
+    assert_eq!(bitstream(&page, "half")[5..], [percent(&half[velocities]), percent(&half[still])]);
+    assert_eq!(bitstream(&page, "float")[5..], [String::new(), percent(&float[still])]);
+    let [float, half] = [float, half].map(|row| row["kinetic_kj"].as_f64().expect("kJ"));
+    assert!((6.5..7.5).contains(&(half / float)), "{}", half / float);
 }

@@ -255,13 +255,14 @@ const FORMULAS: [(&str, &[&str]); 10] = [
 fn the_json_keys_are_stable() {
     for (name, ids) in FORMULAS {
         let document = document(&[name]);
-        assert_eq!((&document["schema"], &document["experiment"]), (&json!(3), &json!(name)));
+        assert_eq!((&document["schema"], &document["experiment"]), (&json!(4), &json!(name)));
         let expected = BTreeSet::from([
             "schema",
             "verb",
             "experiment",
             "thesis",
             "complete",
+            "facts",
             "bodies",
             "collisions",
             "contact_iterations",

@@ -2,7 +2,7 @@
 //! `PGS_VECTORS` on the thesis' scene with figures that were measured outside this project.
 
 use crate::common::{
-    copy, golden, near, number, run, skipped, text, variable, write as write_array,
+    at, copy, golden, near, number, rows, run, skipped, text, variable, write as write_array,
 };
 use serde_json::Value;
 
@@ -15,8 +15,8 @@ fn study(arguments: &[&str]) -> Value {
 
 /// A cell of the sum "each once" in the table of `formats`.
 fn once<'a>(document: &'a Value, format: &str, of: &str) -> &'a Value {
-    let rows = document["tables"][0]["rows"].as_array().expect("rows");
-    let sum = rows.iter().find(|row| row["kind"] == "each once").expect("the sum");
+    let all = document["tables"][0]["rows"].as_array().expect("rows");
+    let sum = all.iter().find(|row| row["kind"] == "each once").expect("the sum");
     &sum[format!("{}_{of}", format.trim_start_matches("thesis16-"))]
 }
 
@@ -26,6 +26,10 @@ fn in_two_orders(input: &str, [original, new]: [&str; 2]) -> Value {
     study(&["compare", &builds[0], &builds[1], "--input", input])
 }
 
+/// The rows of `determinism`.
+const GPU: &str = "as-given against gpu";
+const PAIRS: &str = "random pairs";
+
 #[test]
 fn the_deviation_of_orders_is_that_of_single_steps() {
     let input = golden("pile5_step60");
@@ -33,30 +37,23 @@ fn the_deviation_of_orders_is_that_of_single_steps() {
     let document = study(&["determinism", "--input", input, "--pairs", "2", "--order-seed", "5"]);
     let named = (&document["verb"], &document["experiment"]);
     assert_eq!(named, (&"thesis".into(), &"determinism".into()));
-    assert_eq!((&document["gpu_order"], &document["complete"]), (&"cells".into(), &true.into()));
-    let compared = [&document["gpu"], &document["pairs"][0], &document["pairs"][1]];
-    let orders = [["gpu", "as-given"], ["random=5", "random=6"], ["random=7", "random=8"]];
-    let mut means = Vec::new();
-    for (comparison, orders) in compared.into_iter().zip(orders) {
-        assert_eq!([&comparison["original"], &comparison["new"]], orders);
-        let point = &comparison["curve"][0];
-        let expected = in_two_orders(input, orders)["rows"][1]["difference"].clone();
-        assert_eq!(point["position"], expected["position"], "{orders:?}");
-        assert_eq!(point["linear_velocity"], expected["linear_velocity"], "{orders:?}");
-        let mean = number(&point["position"]["relative_mean_percent"]);
-        assert!(mean > 1e-3, "{orders:?} differ");
-        means.push(mean);
-        let bins = comparison["position_histogram"]["counts"].as_array().expect("counts");
-        let binned = bins.iter().fold(0.0, |sum, count| sum + number(count));
-        let others = ["equal", "below", "above", "original_zero"]
-            .map(|name| number(&comparison["position_histogram"][name]));
-        near(&point["position"]["components"], binned + others.iter().fold(0.0, |a, b| a + b), 0.0);
+    assert_eq!(document["complete"], true);
+    let said = document["facts"].to_string();
+    assert!(said.contains("(cells)") && said.contains("84.290 % under 1 %"), "{said}");
+    let expected = |orders| at(&in_two_orders(input, orders), 1, "B").clone();
+    let of = ["position_mean_percent", "position_under_1_percent", "linear_within_1_percent"];
+    let (gpu, found) = (expected(["gpu", "as-given"]), at(&document, 1, GPU));
+    let pairs = [["random=5", "random=6"], ["random=7", "random=8"]].map(expected);
+    for key in of {
+        assert_eq!(found[key], gpu[key], "{key}");
+        let [one, other] = [&pairs[0], &pairs[1]].map(|row| number(&row[key]));
+        assert!(one > 1e-3 && other > 1e-3, "{key}: {one} {other}");
+        near(&at(&document, 1, PAIRS)[key], f64::midpoint(one, other), 1e-9);
+        // The deviation over n - 1 of two values is their distance by the root of 2.
+        near(&at(&document, 1, "+-")[key], (one - other).abs() / 2.0_f64.sqrt(), 1e-9);
     }
-    let over = &document["over_pairs"][0]["position_mean_percent"];
-    near(&over["mean"], f64::midpoint(means[1], means[2]), 1e-9);
-    // The deviation over n - 1 of two values is their distance by the root of 2.
-    near(&over["standard_deviation"], (means[1] - means[2]).abs() / 2.0_f64.sqrt(), 1e-9);
-    near(&document["recorded"][1]["under_1_percent_share"], 0.8429, 0.0);
+    let spread = &rows(&document, "positions")[0];
+    near(&spread["below_1_percent"], number(&found["position_under_1_percent"]), 1e-9);
 }
 
 #[test]
@@ -66,10 +63,10 @@ fn the_order_of_the_gpu_is_that_of_the_folder_if_it_has_one() {
     let order = [1_u32, 0].map(u32::to_le_bytes);
     write_array(&folder, "gpu_order.npy", "<u4", &[2], &order);
     let document = study(&["determinism", "--input", input, "--pairs", "0"]);
-    assert_eq!(document["gpu_order"], "gpu_order.npy");
+    assert!(document["facts"].to_string().contains("(gpu_order.npy)"), "{document:#}");
     // The other order of two collisions moves the cubes otherwise.
-    assert!(number(&document["gpu"]["curve"][0]["linear_velocity"]["absolute_largest"]) > 0.0);
-    assert_eq!(document["over_pairs"], Value::Array(Vec::new()));
+    assert!(number(&at(&document, 1, GPU)["linear_most_m_s"]) > 0.0);
+    assert_eq!(rows(&document, "steps").len(), 1);
 
     write_array(&folder, "gpu_order.npy", "<u4", &[2], &[1_u32.to_le_bytes()]);
     for verb in [&["thesis", "determinism"][..], &["thesis", "compare", "float,gpu", "float"]] {
@@ -83,25 +80,23 @@ fn the_order_of_the_gpu_is_that_of_the_folder_if_it_has_one() {
 fn orders_lead_further_apart_step_by_step_and_the_same_way_every_time() {
     let scene =
         ["determinism", "--grid", "4x4x4", "--steps", "70", "--pairs", "2", "--drop", "0.1"];
+    let scene = [&scene[..], &["--every", "1"]].concat();
     let document = study(&scene);
-    assert_eq!(document["over_pairs"].as_array().map(Vec::len), Some(70));
-    let apart =
-        |step: usize| number(&document["gpu"]["curve"][step - 1]["position"]["absolute_mean"]);
+    assert_eq!(rows(&document, "steps").len(), 3 * 70);
+    let apart = |step: u64, side| number(&at(&document, step, side)["position_mean_mm"]);
+    let [gpu, pairs] = [GPU, PAIRS].map(|side| move |step| apart(step, side));
     // Free fall has no collisions.
-    assert!(apart(5) <= 0.0, "{}", apart(5));
-    assert!(apart(70) > 2.0 * apart(12) && apart(12) > 0.0, "{} {}", apart(12), apart(70));
-    let over = |step: usize| number(&document["over_pairs"][step - 1]["position_mean_m"]["mean"]);
-    assert!(over(5) <= 0.0 && over(12) > 0.0, "{} {}", over(5), over(12));
+    assert!(gpu(5) <= 0.0 && pairs(5) <= 0.0, "{} {}", gpu(5), pairs(5));
+    assert!(gpu(70) > 2.0 * gpu(12) && gpu(12) > 0.0, "{} {}", gpu(12), gpu(70));
+    assert!(pairs(12) > 0.0, "{}", pairs(12));
     let again = study(&[&scene[..], &["--threads", "1", "--fast", "off"]].concat());
-    for part in ["gpu", "pairs", "over_pairs"] {
-        assert_eq!(again[part], document[part], "{part}");
-    }
+    assert_eq!(again["tables"], document["tables"]);
 
     // The state after some steps is the start of others.
     let one = study(&["determinism", "--grid", "4x4x4", "--from", "40", "--steps", "1"]);
-    assert_eq!(one["over_pairs"].as_array().map(Vec::len), Some(1));
-    assert!(number(&one["over_pairs"][0]["position_mean_percent"]["mean"]) > 0.0);
-    near(&one["config"]["from"], 40.0, 0.0);
+    assert_eq!(rows(&one, "steps").len(), 3);
+    assert!(number(&at(&one, 1, PAIRS)["position_mean_percent"]) > 0.0);
+    assert!(one["facts"].to_string().contains("1 steps after step 40"), "{one:#}");
 }
 
 #[test]
@@ -109,27 +104,27 @@ fn sixteen_bits_are_compared_with_float_as_compare_does() {
     let input = golden("pile5_step61");
     let input = text(&input);
     let document = study(&["half", "--input", input]);
-    for (place, build) in ["half", "half,thesis16", "half,thesis16-literal"].into_iter().enumerate()
-    {
-        assert_eq!(document["builds"][place]["build"], build);
+    for build in ["half,thesis16", "half,thesis16-literal"] {
+        at(&document, 1, build);
     }
-    let compared = run(["thesis", "compare", "float", "half", "--input", input, "--json"]).json();
-    let row = &compared["rows"][1];
-    let point = &document["builds"][0]["curve"][0];
-    assert_eq!(point["position"], row["difference"]["position"]);
-    assert_eq!(point["linear_velocity"], row["difference"]["linear_velocity"]);
-    assert_eq!(point["unmoved_share"], row["b"]["unmoved_share"]);
-    let energy = ["a", "b"].map(|side| number(&row[side]["kinetic_energy_j"]));
-    near(&point["energy_ratio"], energy[1] / energy[0], 1e-9);
+    let compared = study(&["compare", "float", "half", "--input", input]);
+    let [float, half] = ["A", "B"].map(|side| at(&compared, 1, side));
+    let found = at(&document, 1, "half");
+    let of = ["position_mean_percent", "linear_within_1_percent", "unmoved_percent", "kinetic_kj"];
+    for key in of {
+        assert_eq!(found[key], half[key], "{key}");
+    }
+    let energy = [float, half].map(|row| number(&row["kinetic_kj"]));
+    near(&found["energy_ratio"], energy[1] / energy[0], 1e-9);
     // `pgs thesis formats` measures the same numbers.
     let formats = run(["thesis", "formats", "--input", input, "--json"]).json();
     for (place, name) in ["binary16", "thesis16", "thesis16-literal"].into_iter().enumerate() {
-        let split = &document["splits"][place];
+        let split = &rows(&document, "splits")[place];
         assert_eq!(split["format"], name);
         let expected = number(once(&formats, name, "mean_percent"));
-        near(&split["relative_mean_percent"], expected, 1e-12);
+        near(&split["mean_percent"], expected, 1e-12);
     }
-    near(&document["recorded"][0]["under_1_percent_share"], 0.9964, 0.0);
+    assert!(document["facts"].to_string().contains("99.640 % under 1 %"), "{document:#}");
 }
 
 #[test]
@@ -137,9 +132,14 @@ fn the_reference_solver_in_binary16_has_the_bits_of_the_board_half() {
     let scene = ["--grid", "4x4x4", "--drop", "0.5", "--steps", "40"];
     let builds = ["half", "--build", "half", "--build", "half,binary16"];
     let document = study(&[&builds[..], &scene[..]].concat());
-    let [board, reference] = [0, 1].map(|at| &document["builds"][at]["curve"]);
-    assert_eq!(board.as_array().map(Vec::len), Some(40));
-    assert_eq!(board, reference);
+    for step in (4..=40).step_by(4) {
+        let [board, reference] = ["half", "half,binary16"].map(|build| at(&document, step, build));
+        for (key, value) in
+            board.as_object().expect("cells").iter().filter(|(key, _)| *key != "side")
+        {
+            assert_eq!(value, &reference[key], "{key}");
+        }
+    }
 }
 
 #[test]
@@ -147,12 +147,11 @@ fn a_pile_in_half_keeps_moving_and_one_in_f32_does_not() {
     let scene = ["--grid", "4x4x4", "--drop", "0.5", "--steps", "150"];
     let arguments = [&["half", "--build", "half", "--build", "naive"], &scene[..]].concat();
     let document = study(&arguments);
-    let last = |place: usize| &document["builds"][place]["curve"][149];
-    let [half, single] = [0, 1].map(|place| number(&last(place)["energy_ratio"]));
+    let last = |key: &str| ["half", "naive"].map(|build| number(&at(&document, 150, build)[key]));
+    let [half, single] = last("energy_ratio");
     assert!(half > 2.0 * single, "half {half} times float, naive {single} times");
-    let [half, single] = [0, 1].map(|place| number(&last(place)["unmoved_share"]));
-    assert!(half > 0.5 && single < 0.5, "unmoved: half {half}, naive {single}");
-    assert_eq!(document["float_kinetic_energy_j"].as_array().map(Vec::len), Some(151));
+    let [half, single] = last("unmoved_percent");
+    assert!(half > 50.0 && single < 50.0, "unmoved: half {half}, naive {single}");
 }
 
 /// Verbs that step a pile to a state lead to the same one: `formats` counts the step that it
@@ -163,11 +162,10 @@ fn a_step_of_the_pile_is_the_same_in_every_verb() {
     let scene = ["--grid", "4x4x4", "--from", "48", "--steps", "1", "--build", "half"];
     let half = study(&[&["half"], &scene[..]].concat());
     for place in 0..2 {
-        let split = &half["splits"][place];
+        let split = &rows(&half, "splits")[place];
         let name = split["format"].as_str().expect("a name");
-        assert_eq!(&split["relative_mean_percent"], once(&formats, name, "mean_percent"), "{name}");
-        let under = number(once(&formats, name, "under_1_percent"));
-        near(&split["under_1_percent_share"], under / 100.0, 1e-12);
+        assert_eq!(&split["mean_percent"], once(&formats, name, "mean_percent"), "{name}");
+        near(&split["under_1_percent"], number(once(&formats, name, "under_1_percent")), 1e-12);
     }
     let ordered =
         run(["thesis", "order", "--grid", "4x4x4", "--drop", "1", "--steps", "49", "--json"])
@@ -192,9 +190,10 @@ fn a_board_gets_the_collisions_in_an_order_of_the_thesis_part() {
     ];
     let digests = orders.map(|order| {
         let document = in_two_orders(input, [order, order]);
-        assert_eq!(document["a"]["digest"], document["b"]["digest"], "{order}");
-        assert_eq!(document["a"]["build"], format!("float,{order}"));
-        document["a"]["digest"]["value"].clone()
+        let [a, b] = rows(&document, "boards") else { panic!("two boards: {document:#}") };
+        assert_eq!(a["digest"], b["digest"], "{order}");
+        assert_eq!(a["build"], format!("float,{order}"));
+        a["digest"].clone()
     });
     for (place, one) in digests.iter().enumerate() {
         assert!(
@@ -209,8 +208,8 @@ fn a_board_gets_the_collisions_in_an_order_of_the_thesis_part() {
     // Another order in each step, the same for a seed.
     let end = |order: &str| {
         let build = format!("float,{order}");
-        study(&["compare", &build, &build, "--grid", "3x3x3", "--steps", "60"])["a"]["digest"]
-            .clone()
+        let document = study(&["compare", &build, &build, "--grid", "3x3x3", "--steps", "60"]);
+        rows(&document, "boards")[0]["digest"].clone()
     };
     assert_eq!(end("random=3"), end("random=3"));
     assert_ne!(end("random=3"), end("gpu"));
@@ -276,13 +275,11 @@ fn the_full_step_deviates_as_others_measured() {
         return;
     };
     let document = study(&["determinism", "--input", text(&folder), "--pairs", "3"]);
-    assert_eq!(document["gpu_order"], "gpu_order.npy");
-    let position = &document["gpu"]["curve"][0]["position"];
-    near(&position["relative_mean_percent"], 0.0237, 0.000_05);
-    near(&position["under_1_percent_share"], 0.997_54, 0.000_005);
-    for pair in document["pairs"].as_array().expect("pairs") {
-        let position = &pair["curve"][0]["position"];
-        near(&position["relative_mean_percent"], 0.038, 0.004);
-        near(&position["under_1_percent_share"], 0.992, 0.002);
-    }
+    assert!(document["facts"].to_string().contains("(gpu_order.npy)"), "{document:#}");
+    let gpu = at(&document, 1, GPU);
+    near(&gpu["position_mean_percent"], 0.0237, 0.000_05);
+    near(&gpu["position_under_1_percent"], 99.754, 0.000_5);
+    let pairs = at(&document, 1, PAIRS);
+    near(&pairs["position_mean_percent"], 0.038, 0.004);
+    near(&pairs["position_under_1_percent"], 99.2, 0.2);
 }

@@ -16,7 +16,7 @@ use zynq_pgs::order::{
 
 use self::cost::Cost;
 use crate::estimate::thesis::BODIES;
-use crate::experiment::{Boards, Experiment, Part, given, shown};
+use crate::experiment::{Boards, Experiment, Measure, Part, shown};
 use crate::figure::{Axis, Drawn, Figure, Series, lines};
 use crate::permutation::body_by_body::{self, Ties};
 use crate::permutation::{self, shuffled};
@@ -42,14 +42,12 @@ The folder is one for `pgs solve`. If it also holds gpu_order.npy (M) <u4, the o
 GPU, this order is measured, too.";
 
 /// The experiment.
-pub(crate) static ORDER: Experiment = Experiment {
-    id: "order",
-    thesis: "§4.7, Algorithm 3",
-    about: "The cost of each order of the collisions: hazards, empty slots, live bodies, host time",
-    boards: Boards::Any,
-    arguments: OrderArgs::augment_args,
-    run: |args, session| measure(&given(args)?, session),
-};
+pub(crate) static ORDER: Experiment = Experiment::of::<OrderArgs>(
+    "order",
+    "§4.7, Algorithm 3",
+    Boards::Any,
+    "The cost of each order of the collisions: hazards, empty slots, live bodies, host time",
+);
 
 /// Its arguments.
 #[derive(Debug, Clone, Args)]
@@ -151,41 +149,44 @@ fn kinds<'a>(input: &'a OrderInput<'a>, gpu: Option<&[u32]>) -> Vec<Kind<'a>> {
     kinds
 }
 
-/// Orders the collisions in every way and measures them.
-fn measure(args: &OrderArgs, session: &Session) -> Result<Part> {
-    let windows = args.depth.iter().map(|depth| IssueWindow::new(*depth, args.per_issue));
-    let windows = windows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
-    let (name, step, gpu) = match &args.input {
-        Some(path) => {
-            let step = GivenStep::folder(path)?;
-            let gpu = permutation::recorded(path, step.collisions.len())?;
-            (format!("the step in {}", shown(path)), Some(step), gpu)
-        }
-        None => {
-            let OrderArgs { grid, drop, steps, .. } = *args;
-            let (scene, mut opened) = pile::open(grid, drop, &session.common, &Build::default())?;
-            let parameters = StepParameters::default();
-            let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
-            (format!("{grid} cubes dropped from {drop} m, step {}", steps + 1), step, None)
-        }
-    };
-    session.end();
-    let Some(step) = step else { return Ok(Part::interrupted()) };
-    let mut buffers = InputBuffers::new();
-    let input = buffers.gather(&step.bodies, &step.collisions[..], &step.shapes);
-    let moving = input.moving.iter().filter(|moving| **moving).count();
-    let mut part = orders(&input, gpu.as_deref(), &windows, &name).map_err(|error| {
-        Failure::input(error).next("`pgs solve` tells more about refused input")
-    })?;
-    let uses = input.pairs.iter().flatten().filter(|body| is_moving(&input, **body)).count();
-    let scene = format!(
-        "{name}: {} collisions of {} moving bodies, {:.2} a body",
-        grouped(input.pairs.len() as u64),
-        grouped(moving as u64),
-        uses as f64 / (moving as f64).max(1.0),
-    );
-    part.fact("scene", scene);
-    Ok(part)
+impl Measure for OrderArgs {
+    /// Orders the collisions in every way and measures them.
+    fn measure(&self, session: &Session) -> Result<Part> {
+        let windows = self.depth.iter().map(|depth| IssueWindow::new(*depth, self.per_issue));
+        let windows = windows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        let (name, step, gpu) = match &self.input {
+            Some(path) => {
+                let step = GivenStep::folder(path)?;
+                let gpu = permutation::recorded(path, step.collisions.len())?;
+                (format!("the step in {}", shown(path)), Some(step), gpu)
+            }
+            None => {
+                let OrderArgs { grid, drop, steps, .. } = *self;
+                let (scene, mut opened) =
+                    pile::open(grid, drop, &session.common, &Build::default())?;
+                let parameters = StepParameters::default();
+                let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
+                (format!("{grid} cubes dropped from {drop} m, step {}", steps + 1), step, None)
+            }
+        };
+        session.end();
+        let Some(step) = step else { return Ok(Part::interrupted()) };
+        let mut buffers = InputBuffers::new();
+        let input = buffers.gather(&step.bodies, &step.collisions[..], &step.shapes);
+        let moving = input.moving.iter().filter(|moving| **moving).count();
+        let mut part = orders(&input, gpu.as_deref(), &windows, &name).map_err(|error| {
+            Failure::input(error).next("`pgs solve` tells more about refused input")
+        })?;
+        let uses = input.pairs.iter().flatten().filter(|body| is_moving(&input, **body)).count();
+        let scene = format!(
+            "{name}: {} collisions of {} moving bodies, {:.2} a body",
+            grouped(input.pairs.len() as u64),
+            grouped(moving as u64),
+            uses as f64 / (moving as f64).max(1.0),
+        );
+        part.fact("scene", scene);
+        Ok(part)
+    }
 }
 
 /// Whether a body moves; a collision without contact points has no bodies.

@@ -8,7 +8,7 @@ use zynq_pgs_view::Recording;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
 
-use crate::experiment::{Boards, Experiment, Part, given};
+use crate::experiment::{Boards, Experiment, Measure, Part};
 use crate::figure::Figure;
 use crate::session::Session;
 use pgs_command::board;
@@ -22,14 +22,12 @@ use pgs_command::pile;
 const EVERY: u32 = 2;
 
 /// The experiment.
-pub(crate) static PILE: Experiment = Experiment {
-    id: "pile",
-    thesis: "§4.3, Figure 4.1",
-    about: "The cubes after their fall, and the collisions of their heaviest step",
-    boards: Boards::Own,
-    arguments: Options::augment_args,
-    run: |args, session| measure(&given(args)?, session),
-};
+pub(crate) static PILE: Experiment = Experiment::of::<Options>(
+    "pile",
+    "§4.3, Figure 4.1",
+    Boards::Own,
+    "The cubes after their fall, and the collisions of their heaviest step",
+);
 
 /// Its arguments.
 #[derive(Debug, Clone, Args)]
@@ -45,56 +43,59 @@ fn counted(count: u64, noun: &str) -> String {
     format!("{} {noun}{plural}", grouped(count))
 }
 
-fn measure(options: &Options, session: &Session) -> Result<Part> {
-    let grid = options.grid;
-    let (mut scene, mut opened) = pile::open(grid, DROP, &session.emulated(), &Build::default())?;
-    session.watch(&mut opened);
-    // As `pgs run`, whose defaults the printed command takes.
-    let [steps, _] = STEPS;
-    let parameters = StepParameters::default()
-        .with_contact_iterations(ITERATIONS)
-        .with_friction_iterations(ITERATIONS);
-    let mut recording = Recording::new(scene.bodies(), scene.geometries());
-    recording.add(0, 0.0, scene.bodies()).map_err(Failure::input)?;
-    let mut most = 0;
-    session.expect(steps.into());
-    for step in 1..=steps {
-        if session.is_interrupted() {
-            return Ok(Part::interrupted());
+impl Measure for Options {
+    fn measure(&self, session: &Session) -> Result<Part> {
+        let grid = self.grid;
+        let (mut scene, mut opened) =
+            pile::open(grid, DROP, &session.emulated(), &Build::default())?;
+        session.watch(&mut opened);
+        // As `pgs run`, whose defaults the printed command takes.
+        let [steps, _] = STEPS;
+        let parameters = StepParameters::default()
+            .with_contact_iterations(ITERATIONS)
+            .with_friction_iterations(ITERATIONS);
+        let mut recording = Recording::new(scene.bodies(), scene.geometries());
+        recording.add(0, 0.0, scene.bodies()).map_err(Failure::input)?;
+        let mut most = 0;
+        session.expect(steps.into());
+        for step in 1..=steps {
+            if session.is_interrupted() {
+                return Ok(Part::interrupted());
+            }
+            most = most.max(scene.detect().len());
+            let (bodies, collisions) = scene.parts_mut();
+            match opened.accelerator.step(bodies, collisions, &parameters) {
+                Ok(_) => session.advance(),
+                Err(error) if board::is_cancelled(&error) => continue,
+                Err(error) => return Err(opened.failure(error)),
+            }
+            if step.is_multiple_of(EVERY) {
+                let time = time_of(step, parameters.time_step);
+                recording.add(step, time, scene.bodies()).map_err(Failure::input)?;
+            }
         }
-        most = most.max(scene.detect().len());
-        let (bodies, collisions) = scene.parts_mut();
-        match opened.accelerator.step(bodies, collisions, &parameters) {
-            Ok(_) => session.advance(),
-            Err(error) if board::is_cancelled(&error) => continue,
-            Err(error) => return Err(opened.failure(error)),
-        }
-        if step.is_multiple_of(EVERY) {
-            let time = time_of(step, parameters.time_step);
-            recording.add(step, time, scene.bodies()).map_err(Failure::input)?;
-        }
+        session.end();
+        let cubes = counted(recording.bodies() as u64, "cube");
+        let title = format!("{cubes} falling on the ground");
+        let facts = [("scene", format!("{grid} cubes, dropped from {DROP} m, {steps} steps"))];
+        let mut figure = Figure::new(
+            ("figure-4-1", "§4.3, Figure 4.1"),
+            format!("A snapshot of the scene: {cubes} after {steps} steps"),
+            Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
+            "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.",
+        );
+        figure.playback = Some(page(&recording, &title, &facts).map_err(Failure::input)?.html);
+        let mut row = figure.row(
+            "cubes, and collisions of a heavy step",
+            "38,880 cubes, 90,000 to 130,000 collisions",
+            format!("{cubes}, up to {}", counted(most as u64, "collision")),
+        );
+        row.command =
+            format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.png");
+        let mut part = Part::of(Vec::new());
+        part.figure(figure, [row]);
+        Ok(part)
     }
-    session.end();
-    let cubes = counted(recording.bodies() as u64, "cube");
-    let title = format!("{cubes} falling on the ground");
-    let facts = [("scene", format!("{grid} cubes, dropped from {DROP} m, {steps} steps"))];
-    let mut figure = Figure::new(
-        ("figure-4-1", "§4.3, Figure 4.1"),
-        format!("A snapshot of the scene: {cubes} after {steps} steps"),
-        Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
-        "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.",
-    );
-    figure.playback = Some(page(&recording, &title, &facts).map_err(Failure::input)?.html);
-    let mut row = figure.row(
-        "cubes, and collisions of a heavy step",
-        "38,880 cubes, 90,000 to 130,000 collisions",
-        format!("{cubes}, up to {}", counted(most as u64, "collision")),
-    );
-    row.command =
-        format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.png");
-    let mut part = Part::of(Vec::new());
-    part.figure(figure, [row]);
-    Ok(part)
 }
 
 #[cfg(test)]

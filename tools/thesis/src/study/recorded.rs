@@ -1,12 +1,10 @@
 //! The figures of the thesis' fourth chapter, as recorded there.
 
-use serde::Serialize;
-
 use crate::figure::{Axis, Drawn, Series, lines};
 use pgs_command::numbers::number;
 
 /// A comparison of two sets of positions in the thesis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RecordedDeviation {
     /// Its place in the thesis.
     pub(crate) thesis: &'static str,

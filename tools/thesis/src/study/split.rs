@@ -17,7 +17,7 @@ use yardstick::Yardstick;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
-use crate::experiment::{Boards, Experiment, Part, given};
+use crate::experiment::{Boards, Experiment, Measure, Part};
 use crate::figure::{Figure, bars};
 use crate::index::Row;
 use crate::session::Session;
@@ -46,15 +46,13 @@ Whole step: 1 / ((1 - p) + p / s) (thesis eq. 6.5), with s the factor of the res
 share: the thesis' 0.6, or the measured one.";
 
 /// The experiment.
-pub(crate) static SPLIT: Experiment = Experiment {
-    id: "split",
-    thesis: "§4.4, equation 6.5",
-    about: "The shares of collision search and response in a step, and what a faster response \
+pub(crate) static SPLIT: Experiment = Experiment::of::<Options>(
+    "split",
+    "§4.4, equation 6.5",
+    Boards::Any,
+    "The shares of collision search and response in a step, and what a faster response \
         gains",
-    boards: Boards::Any,
-    arguments: Options::augment_args,
-    run: |args, session| measure(&given(args)?, session),
-};
+);
 
 /// Its arguments.
 #[derive(Debug, Clone, Args)]
@@ -102,72 +100,74 @@ pub(crate) struct Gain {
     pub(crate) recorded: Option<f64>,
 }
 
-/// Steps the pile, and times each measured step's search and response.
-fn measure(options: &Options, session: &Session) -> Result<Part> {
-    let Options { grid, drop, .. } = *options;
-    let build = Build { threads: Some(1), ..Build::default() };
-    let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
-    scene.set_threads(1);
-    session.watch(&mut opened);
-    let parameters = StepParameters::default();
-    session.expect(u64::from(options.steps) + u64::from(options.runs));
-    let mut samples = Vec::new();
-    let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, options.steps, || {
-        session.advance();
-        !session.is_interrupted()
-    })?;
-    for _ in 0..options.runs {
-        goes_on = goes_on && !session.is_interrupted();
-        if !goes_on {
-            break;
+impl Measure for Options {
+    /// Steps the pile, and times each measured step's search and response.
+    fn measure(&self, session: &Session) -> Result<Part> {
+        let Options { grid, drop, .. } = *self;
+        let build = Build { threads: Some(1), ..Build::default() };
+        let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
+        scene.set_threads(1);
+        session.watch(&mut opened);
+        let parameters = StepParameters::default();
+        session.expect(u64::from(self.steps) + u64::from(self.runs));
+        let mut samples = Vec::new();
+        let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, self.steps, || {
+            session.advance();
+            !session.is_interrupted()
+        })?;
+        for _ in 0..self.runs {
+            goes_on = goes_on && !session.is_interrupted();
+            if !goes_on {
+                break;
+            }
+            let search = spent(|| measured_search(&mut scene))?;
+            let response = respond(&scene, &parameters)?;
+            let (bodies, collisions) = scene.parts_mut();
+            let report = match opened.accelerator.step(bodies, collisions, &parameters) {
+                Ok(report) => report,
+                Err(error) if board::is_cancelled(&error) => break,
+                Err(error) => return Err(opened.failure(error)),
+            };
+            session.advance();
+            samples.push(Times {
+                search_ms: milliseconds(search),
+                response_ms: milliseconds(response),
+                driver_ms: milliseconds(driver(&report)),
+                board_ms: milliseconds(report.modelled_time()),
+            });
         }
-        let search = spent(|| measured_search(&mut scene))?;
-        let response = respond(&scene, &parameters)?;
-        let (bodies, collisions) = scene.parts_mut();
-        let report = match opened.accelerator.step(bodies, collisions, &parameters) {
-            Ok(report) => report,
-            Err(error) if board::is_cancelled(&error) => break,
-            Err(error) => return Err(opened.failure(error)),
-        };
-        session.advance();
-        samples.push(Times {
-            search_ms: milliseconds(search),
-            response_ms: milliseconds(response),
-            driver_ms: milliseconds(driver(&report)),
-            board_ms: milliseconds(report.modelled_time()),
-        });
-    }
-    session.end();
-    let (bodies, collisions) = (scene.bodies().len() as u64, scene.collisions().len() as u64);
-    let mut part = Part::of(Vec::new());
-    part.complete = samples.len() as u64 == u64::from(options.runs);
-    let pile = format!(
-        "{grid} cubes dropped from {drop} m: {} bodies, {} collisions, median of {} steps, one \
+        session.end();
+        let (bodies, collisions) = (scene.bodies().len() as u64, scene.collisions().len() as u64);
+        let mut part = Part::of(Vec::new());
+        part.complete = samples.len() as u64 == u64::from(self.runs);
+        let pile = format!(
+            "{grid} cubes dropped from {drop} m: {} bodies, {} collisions, median of {} steps, one \
          thread",
-        grouped(bodies),
-        grouped(collisions),
-        samples.len()
-    );
-    part.fact("pile", pile);
-    // None if Ctrl-C came before the first measured step.
-    let Some(times) = Times::median(&samples) else { return Ok(part) };
-    let shares = samples.iter().map(Times::response_share);
-    let [least, most] = shares
-        .fold([1.0, 0.0], |[least, most]: [f64; 2], share| [least.min(share), most.max(share)]);
-    part.tables = vec![times.table(), table_of_gains(&gains(&times))];
-    let response = times.response_share();
-    let text = format!(
-        "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); thesis {:.0} \
+            grouped(bodies),
+            grouped(collisions),
+            samples.len()
+        );
+        part.fact("pile", pile);
+        // None if Ctrl-C came before the first measured step.
+        let Some(times) = Times::median(&samples) else { return Ok(part) };
+        let shares = samples.iter().map(Times::response_share);
+        let [least, most] = shares
+            .fold([1.0, 0.0], |[least, most]: [f64; 2], share| [least.min(share), most.max(share)]);
+        part.tables = vec![times.table(), table_of_gains(&gains(&times))];
+        let response = times.response_share();
+        let text = format!(
+            "response {:.1} % of search and response ({:.1} to {:.1} % in single steps); thesis {:.0} \
          % (recorded)",
-        100.0 * response,
-        100.0 * least,
-        100.0 * most,
-        100.0 * ACCELERATED_SHARE,
-    );
-    part.fact("share", text);
-    let (figure, row) = figure(grid, response);
-    part.figure(figure, [row]);
-    Ok(part)
+            100.0 * response,
+            100.0 * least,
+            100.0 * most,
+            100.0 * ACCELERATED_SHARE,
+        );
+        part.fact("share", text);
+        let (figure, row) = figure(grid, response);
+        part.figure(figure, [row]);
+        Ok(part)
+    }
 }
 
 /// The yardstick's time for the step.

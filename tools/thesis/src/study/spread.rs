@@ -1,32 +1,22 @@
 //! Sums up a measure over several runs.
 
-use serde::Serialize;
-
 /// A measure over several runs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spread {
     pub(crate) mean: f64,
     /// From the mean, over n - 1; 0 for one run.
     pub(crate) standard_deviation: f64,
-    pub(crate) least: f64,
-    pub(crate) most: f64,
 }
 
 impl Spread {
     /// Sums up; none without a run.
     pub(crate) fn of(values: &[f64]) -> Option<Self> {
-        let first = *values.first()?;
         let count = values.len() as f64;
-        let mean = sum(values.iter().copied()) / count;
+        let mean = (!values.is_empty()).then(|| sum(values.iter().copied()) / count)?;
         let squares = sum(values.iter().map(|value| (value - mean) * (value - mean)));
-        let (mut least, mut most) = (first, first);
-        for value in values.iter().copied() {
-            least = if value < least { value } else { least };
-            most = if value > most { value } else { most };
-        }
         let standard_deviation =
             if values.len() < 2 { 0.0 } else { (squares / (count - 1.0)).sqrt() };
-        Some(Self { mean, standard_deviation, least, most })
+        Some(Self { mean, standard_deviation })
     }
 }
 
@@ -45,7 +35,6 @@ mod tests {
         assert!((spread.mean - 3.0).abs() < 1e-12);
         // (4 + 1 + 0 + 9) / 3
         assert!((spread.standard_deviation - (14.0_f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert!((spread.least - 1.0).abs() + (spread.most - 6.0).abs() < 1e-12);
         let one = Spread::of(&[5.0]).expect("one run");
         assert!((one.mean - 5.0).abs() + one.standard_deviation < 1e-12);
         assert_eq!(Spread::of(&[]), None);

@@ -1,17 +1,15 @@
-//! The state in which the runs of a study start: a folder's, or a scene's after some steps.
+//! The state in which the runs of an experiment start: a folder's, or a scene's after some steps.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use bitstream_model::BoardConfig;
 use clap::Args;
-use serde_json::{Value, json};
 use zynq_pgs::emulation::Build;
-use zynq_pgs::order::Order;
-use zynq_pgs::{Body, Shape, StepParameters};
+use zynq_pgs::{Body, Collision, Shape, StepParameters};
 
-use super::run::{Run, World};
 use crate::experiment::shown;
-use crate::formats::{EACH_ONCE, numbers};
-use crate::permutation::{self, Permutation};
+use crate::permutation;
 use crate::session::Session;
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::CommonArgs;
@@ -27,176 +25,170 @@ use step_folder::folder::Folder;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct StartArgs {
     /// Take one step from this folder of .npy arrays instead of a scene.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "from"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "steps", "every", "from"])]
     pub(crate) input: Option<PathBuf>,
     /// Steps of each run [default: 120, one from a folder]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
-    /// Steps in float that the scene takes before the runs start from one state.
+    /// Show every N-th step [default: a tenth of the steps]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Steps that the scene takes on the first board before all runs start from one state.
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) from: u32,
+    from: u32,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
     #[command(flatten)]
-    pub(crate) solver: SolverArgs,
+    solver: SolverArgs,
     #[command(flatten)]
-    pub(crate) deadline: DeadlineArgs,
+    deadline: DeadlineArgs,
 }
 
 /// Steps of a run from a scene.
 const STEPS: u32 = 120;
+/// Shown steps, about.
+const ROWS: u32 = 10;
+
+/// The bodies and collisions of a run.
+#[derive(Debug, Clone)]
+pub(crate) enum World {
+    /// A scene, whose collisions are detected.
+    Scene(Box<Scene>),
+    /// One step from a folder, without the shapes' geometry.
+    Folder { folder: Arc<Folder>, bodies: Vec<Body> },
+}
+
+impl World {
+    pub(crate) fn bodies(&self) -> &[Body] {
+        match self {
+            Self::Scene(scene) => scene.bodies(),
+            Self::Folder { bodies, .. } => bodies,
+        }
+    }
+
+    pub(crate) fn shapes(&self) -> &[Shape] {
+        match self {
+            Self::Scene(scene) => scene.shapes(),
+            Self::Folder { folder, .. } => &folder.shapes,
+        }
+    }
+
+    /// The collisions that were detected last; a folder's are the same at any time.
+    pub(crate) fn collisions(&self) -> &[Collision] {
+        match self {
+            Self::Scene(scene) => scene.collisions(),
+            Self::Folder { folder, .. } => &folder.collisions,
+        }
+    }
+
+    /// Bodies to step, and the collisions that were detected last.
+    pub(crate) fn parts_mut(&mut self) -> (&mut [Body], &[Collision]) {
+        match self {
+            Self::Scene(scene) => scene.parts_mut(),
+            Self::Folder { folder, bodies } => (bodies, &folder.collisions),
+        }
+    }
+
+    /// Makes a failure of the driver's error; for a folder, with the array at fault.
+    pub(crate) fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
+        let folder = match self {
+            Self::Scene(_) => None,
+            Self::Folder { folder, .. } => Some(&**folder),
+        };
+        step_input::failure(folder, opened, error)
+    }
+}
 
 /// The state in which all runs start.
 #[derive(Debug)]
-pub(super) struct Start<'a> {
+pub(crate) struct Start<'a> {
     args: &'a StartArgs,
-    /// The folder; none for a scene.
-    folder: Option<Folder>,
+    pub(crate) world: World,
     /// The order of Bullet's GPU, if the folder has it.
-    recorded_order: Option<Vec<u32>>,
-    /// The scene; none for a folder.
-    scene: Option<Scene>,
-    bodies: Vec<Body>,
-    shapes: Vec<Shape>,
-    pub(super) parameters: StepParameters,
-    pub(super) steps: u32,
+    pub(crate) recorded_order: Option<Vec<u32>>,
+    pub(crate) parameters: StepParameters,
+    pub(crate) steps: u32,
 }
 
 impl<'a> Start<'a> {
     /// Loads the folder or builds the scene; the scene stands at its beginning.
-    pub(super) fn load(args: &'a StartArgs) -> Result<Self> {
-        let folder = args.input.as_deref().map(step_input::load).transpose()?;
-        let own = folder.as_ref().map_or_else(StepParameters::default, |folder| folder.parameters);
-        let parameters = args.deadline.apply(args.solver.apply(own));
-        let parameters = parameters.with_order(Some(Order::AsGiven));
-        let (scene, bodies, shapes) = match &folder {
-            Some(folder) => (None, folder.bodies.clone(), folder.shapes.clone()),
+    pub(crate) fn load(args: &'a StartArgs) -> Result<Self> {
+        let (world, recorded_order, own, steps) = match &args.input {
+            Some(path) => {
+                let folder = step_input::load(path)?;
+                let recorded = permutation::recorded(&folder.path, folder.collisions.len())?;
+                let (own, bodies) = (folder.parameters, folder.bodies.clone());
+                (World::Folder { folder: Arc::new(folder), bodies }, recorded, own, 1)
+            }
             None => {
-                let scene = args.scene.build(&Build::default())?;
-                let (bodies, shapes) = (scene.bodies().to_vec(), scene.shapes().to_vec());
-                (Some(scene), bodies, shapes)
+                let scene = Box::new(args.scene.build(&Build::default())?);
+                let steps = args.steps.unwrap_or(STEPS);
+                (World::Scene(scene), None, StepParameters::default(), steps)
             }
         };
-        let recorded_order = match &folder {
-            Some(folder) => permutation::recorded(&folder.path, folder.collisions.len())?,
-            None => None,
-        };
-        let steps = if folder.is_some() { 1 } else { args.steps.unwrap_or(STEPS) };
-        Ok(Self { args, folder, recorded_order, scene, bodies, shapes, parameters, steps })
+        let parameters = args.deadline.apply(args.solver.apply(own));
+        Ok(Self { args, world, recorded_order, parameters, steps })
     }
 
-    pub(super) fn shapes(&self) -> &[Shape] {
-        &self.shapes
-    }
-
-    pub(super) fn bodies(&self) -> &[Body] {
-        &self.bodies
-    }
-
-    /// The numbers that the next step of a run gives the board, each once.
-    pub(super) fn numbers(&self, run: &mut Run<'_>) -> Vec<f32> {
-        let collisions = run.world.collisions();
-        let kinds = numbers(run.bodies(), &self.shapes, &collisions);
-        EACH_ONCE.of(&kinds).copied().collect()
-    }
-
-    /// Whether the order of Bullet's GPU is recorded.
-    pub(super) fn has_recorded_order(&self) -> bool {
-        self.recorded_order.is_some()
-    }
-
-    /// Opens a board of this build with the shapes of the start.
-    pub(super) fn open(
+    /// Opens a board with the shapes of the start.
+    pub(crate) fn open(
         &self,
         build: &Build,
+        config: BoardConfig,
         common: &CommonArgs,
         session: &Session,
     ) -> Result<OpenBoard> {
-        let config = self.args.scene.config(build);
         let mut opened = board::open_as(common, build, config)?.stated();
-        match &self.folder {
-            Some(folder) => {
+        match &self.world {
+            World::Folder { folder, .. } => {
                 let most = opened.accelerator.capabilities().shapes_max();
                 folder.check_shapes(most).map_err(Failure::input)?;
             }
-            None => self.args.scene.check_size(opened.accelerator.capabilities())?,
+            World::Scene(_) => self.args.scene.check_size(opened.accelerator.capabilities())?,
         }
-        step_input::set_shapes(&mut opened.accelerator, &self.shapes)
-            .map_err(|error| self.failure(&opened, error))?;
+        step_input::set_shapes(&mut opened.accelerator, self.world.shapes())
+            .map_err(|error| self.world.failure(&opened, error))?;
         session.watch(&mut opened);
         Ok(opened)
     }
 
-    /// A run from here, in an order; as given if none.
-    pub(super) fn run(&self, permutation: Option<Permutation>) -> Result<Run<'_>> {
-        let world = match (&self.folder, &self.scene) {
-            (Some(folder), _) => World::Folder { folder, bodies: self.bodies.clone() },
-            (None, Some(scene)) => World::Scene(Box::new(scene.clone())),
-            (None, None) => World::Scene(Box::new(self.args.scene.build(&Build::default())?)),
-        };
-        Ok(Run::new(world, permutation, self.recorded_order.clone()))
-    }
-
     /// Takes the steps before the start on the board; false if Ctrl-C ended them.
-    pub(super) fn step_to(&mut self, opened: &mut OpenBoard, session: &Session) -> Result<bool> {
-        let Some(scene) = self.scene.as_mut().filter(|_| self.args.from > 0) else {
-            return Ok(true);
-        };
-        session.expect(self.args.from.into());
-        let taken = pile::step_to(scene, opened, &self.parameters, self.args.from, || {
+    pub(crate) fn step_to(&mut self, opened: &mut OpenBoard, session: &Session) -> Result<bool> {
+        let from = self.args.from;
+        let World::Scene(scene) = &mut self.world else { return Ok(true) };
+        session.expect(from.into());
+        pile::step_to(scene, opened, &self.parameters, from, || {
             session.advance();
             !session.is_interrupted()
-        })?;
-        if taken {
-            self.bodies = scene.bodies().to_vec();
-        }
-        Ok(taken)
+        })
     }
 
-    /// Makes a failure of the driver's error; for a folder, with the array at fault.
-    pub(super) fn failure(&self, opened: &OpenBoard, error: zynq_pgs::Error) -> Failure {
-        step_input::failure(self.folder.as_ref(), opened, error)
+    /// The steps that a table shows: the start, the first, the last, and some between.
+    pub(crate) fn shown(&self) -> impl Iterator<Item = u32> {
+        let every = self.args.every.unwrap_or(self.steps.div_ceil(ROWS));
+        let last = self.steps;
+        (0..=last).filter(move |step| *step <= 1 || step % every == 0 || *step == last)
     }
 
     /// The start for people.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
+        let (steps, from) = (self.steps, self.args.from);
         match &self.args.input {
             Some(path) => format!("{}, one step", path.display()),
-            None if self.args.from > 0 => {
-                format!(
-                    "{}, {} steps after step {}",
-                    self.args.scene.text(),
-                    self.steps,
-                    self.args.from
-                )
+            None if from > 0 => {
+                format!("{}, {steps} steps after step {from}", self.args.scene.text())
             }
-            None => format!("{}, {} steps", self.args.scene.text(), self.steps),
+            None => format!("{}, {steps} steps", self.args.scene.text()),
         }
     }
 
     /// The steps of the runs, for the caption of a figure.
-    pub(super) fn subject(&self) -> String {
-        match (&self.args.input, self.args.from, self.steps) {
-            (Some(path), ..) => format!("the step in {}", shown(path)),
-            (None, from, 1) => {
-                format!("step {} of our pile of {}", from + 1, self.args.scene.text())
-            }
-            _ => format!("{} steps of our pile of {}", self.steps, self.args.scene.text()),
+    pub(crate) fn subject(&self) -> String {
+        let scene = || self.args.scene.text();
+        match (&self.args.input, self.steps) {
+            (Some(path), _) => format!("the step in {}", shown(path)),
+            (None, 1) => format!("step {} of our pile of {}", self.args.from + 1, scene()),
+            (None, steps) => format!("{steps} steps of our pile of {}", scene()),
         }
-    }
-
-    /// The start for programs.
-    pub(super) fn to_json(&self) -> Value {
-        let mut config = match &self.args.input {
-            Some(path) => json!({ "input": path.display().to_string() }),
-            None => self.args.scene.to_json(),
-        };
-        config["steps"] = self.steps.into();
-        config["from"] = self.args.from.into();
-        config["contact_iterations"] = self.parameters.contact_iterations.into();
-        config["friction_iterations"] = self.parameters.friction_iterations.into();
-        config["time_step_s"] = self.parameters.time_step.into();
-        config["spin_damping"] = self.parameters.spin_damping.into();
-        config
     }
 }

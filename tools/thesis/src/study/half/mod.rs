@@ -1,29 +1,24 @@
 //! Thesis §4.6: the scene in sixteen bits beside float, after one step and after many.
 
 mod figures;
-mod show;
 mod splits;
-mod words;
 
 use std::fmt;
 use std::str::FromStr;
 
 use clap::Args;
-use serde::Serialize;
-use serde_json::Value;
 use zynq_pgs::emulation::{Build, BuildError};
+use zynq_pgs::order::Order;
 
-use self::splits::Split;
-use super::recorded::{HALF_AGAINST_FLOAT, RecordedDeviation};
-use super::run::Run;
+use self::figures::Shown;
+use super::course::{Side, Solver, Steps, take};
+use super::recorded::HALF_AGAINST_FLOAT;
 use super::start::{Start, StartArgs};
-use crate::deviation::{StateDeviation, components, moving, unmoved_share};
-use crate::experiment::{Boards, Experiment, given};
-use crate::histogram::Histogram;
-use crate::narrow::{NarrowFormat, carried};
+use crate::deviation::Deviations;
+use crate::experiment::{Boards, Experiment, Measure, Part};
+use crate::formats::{EACH_ONCE, numbers};
+use crate::narrow::NarrowFormat;
 use crate::session::Session;
-use pgs_command::board::OpenBoard;
-use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Failure, Result};
 
 const EXAMPLES: &str = "\
@@ -39,20 +34,16 @@ thesis' own sixteen bits in its words, and half,thesis16-literal its encoder tak
 board has these, the reference solver computes them. Unmoved is the share of position components
 whose bits, as sent to the board, a step did not change. Energies are kinetic.
 
-The splits are of the sixteen bits of a number into exponent and mantissa (thesis §4.6.4), on the
-numbers that the step after the last one of float gives the board, or on the folder's. The highest
-exponent is that of the largest number; bits are cut off as in the thesis' format, and numbers below
-the range become the smallest one. No board is built with them.";
+The last table has the errors of each form on the numbers that the step after the last one of float
+gives the board, or on the folder's.";
 
 /// The experiment.
-pub(crate) static HALF: Experiment = Experiment {
-    id: "half",
-    thesis: "§4.6, Figure 4.10",
-    about: "Sixteen bits beside float",
-    boards: Boards::Own,
-    arguments: Options::augment_args,
-    run: |args, session| Ok(measure(&given(args)?, session)?.part()),
-};
+pub(crate) static HALF: Experiment = Experiment::of::<Options>(
+    "half",
+    "§4.6, Figure 4.10",
+    Boards::Own,
+    "Sixteen bits beside float",
+);
 
 /// Its arguments.
 #[derive(Debug, Clone, Args)]
@@ -103,179 +94,71 @@ const DEFAULTS: [&str; 3] = ["half", "half,thesis16", "half,thesis16-literal"];
 /// The build that the others are compared with.
 const ORIGINAL: &str = "float";
 
-/// The outcome.
-#[derive(Debug, Serialize)]
-pub(crate) struct Outcome {
-    pub(crate) config: Value,
-    /// Whether no Ctrl-C ended the runs.
-    pub(crate) complete: bool,
-    /// The kinetic energy of float at the start and after each step, J.
-    pub(crate) float_kinetic_energy_j: Vec<f64>,
-    /// The share of position components that each step of float left as they were.
-    pub(crate) float_unmoved_share: Vec<f64>,
-    pub(crate) builds: Vec<OfBuild>,
-    pub(crate) splits: Vec<Split>,
-    pub(crate) recorded: [RecordedDeviation; 1],
-    #[serde(skip)]
-    start_text: String,
-    #[serde(skip)]
-    subject: String,
-}
+/// Measures of a step that are shown.
+const MEASURES: [&str; 7] = [
+    "kinetic_kj",
+    "energy_ratio",
+    "unmoved_percent",
+    "position_mean_percent",
+    "position_under_1_percent",
+    "position_mean_mm",
+    "linear_within_1_percent",
+];
 
-/// A build beside float.
-#[derive(Debug, Serialize)]
-pub(crate) struct OfBuild {
-    pub(crate) build: String,
-    pub(crate) curve: Vec<Point>,
-    /// The positions after its last step, against float's positions.
-    pub(crate) position_histogram: Option<Histogram>,
-    /// The step that failed on the board, and why.
-    pub(crate) failed: Option<Failed>,
-}
+impl Measure for Options {
+    /// Steps all boards and compares them with float.
+    fn measure(&self, session: &Session) -> Result<Part> {
+        let common = session.emulated();
+        let mut start = Start::load(&self.start)?;
+        let open = |start: &Start<'_>, build: &Build| {
+            start.open(build, self.start.scene.config(build), &common, session)
+        };
+        let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
+        let mut boards = vec![open(&start, &original)?];
+        let begun = start.step_to(&mut boards[0], session)?;
+        let parameters = start.parameters.with_order(Some(Order::AsGiven));
+        let side = |name: String, solver| Side::new(name, &start, solver, None, parameters);
+        let mut sides = vec![side(ORIGINAL.to_owned(), Solver::Board(0))];
+        for build in &self.builds {
+            let about = |failure: Failure| failure.about(format!("board {build}"));
+            let solver = match build {
+                SixteenBits::Board(build) => {
+                    boards.push(open(&start, build).map_err(about)?);
+                    Solver::Board(boards.len() - 1)
+                }
+                SixteenBits::Words(format) => Solver::Words(*format),
+            };
+            sides.push(side(build.to_string(), solver));
+        }
+        let complete = begun && take(&mut sides, 0, &mut boards, &start, session)?;
+        session.end();
 
-/// A build and float after a step.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Point {
-    pub(crate) step: u32,
-    /// Against float.
-    #[serde(flatten)]
-    pub(crate) state: StateDeviation,
-    pub(crate) kinetic_energy_j: f64,
-    /// The energy by that of float; none where float rests.
-    pub(crate) energy_ratio: Option<f64>,
-    pub(crate) unmoved_share: f64,
-}
-
-/// A step that failed.
-#[derive(Debug, Serialize)]
-pub(crate) struct Failed {
-    pub(crate) step: u32,
-    pub(crate) error: String,
-}
-
-/// A board and its run; without a board the reference solver takes the steps.
-struct Side<'a> {
-    opened: Option<OpenBoard>,
-    run: Run<'a>,
-    /// The format of poses, if it has sixteen bits.
-    poses: Option<NarrowFormat>,
-}
-
-impl<'a> Side<'a> {
-    fn new(opened: OpenBoard, start: &'a Start<'_>) -> Result<Self> {
-        let poses = NarrowFormat::of(opened.accelerator.capabilities().variant.numbers.poses);
-        Ok(Self { opened: Some(opened), run: start.run(None)?, poses })
-    }
-
-    fn of(
-        numbers: &SixteenBits,
-        common: &CommonArgs,
-        start: &'a Start<'_>,
-        session: &Session,
-    ) -> Result<Self> {
-        match numbers {
-            SixteenBits::Board(build) => Self::new(start.open(build, common, session)?, start),
-            SixteenBits::Words(format) => {
-                Ok(Self { opened: None, run: start.run(None)?, poses: Some(*format) })
+        let mut steps = Steps::new("Sixteen bits beside float, step by step", &MEASURES);
+        steps.rows(&start, &sides);
+        // A folder's collisions belong to the state before the step.
+        let world = if self.start.input.is_some() { &start.world } else { &sides[0].world };
+        let kinds = numbers(world.bodies(), world.shapes(), world.collisions());
+        let splits = splits::of(&EACH_ONCE.of(&kinds).copied().collect::<Vec<_>>());
+        let mut part = Part::of(vec![steps.table]);
+        part.complete = complete;
+        part.fact("start", start.text());
+        for side in &sides {
+            if let Some((step, failure)) = &side.failed {
+                part.fact("failed", format!("{} in step {step}: {}", side.name, failure.chain()));
             }
         }
-    }
-
-    /// Takes a step; the share of position components that it left as they were, none at Ctrl-C.
-    fn step(
-        &mut self,
-        start: &Start<'_>,
-        moving: &[bool],
-        session: &Session,
-    ) -> Result<Option<f64>> {
-        let before = self.run.bodies().to_vec();
-        let taken = match (&mut self.opened, self.poses) {
-            (Some(opened), _) => self.run.step(opened, &start.parameters, session)?,
-            (None, Some(format)) => self.run.step_by(session, |bodies, collisions| {
-                words::step(format, bodies, start.shapes(), collisions, &start.parameters)
-            })?,
-            (None, None) => false,
-        };
-        Ok(taken.then(|| {
-            unmoved_share(&before, self.run.bodies(), moving, |value| carried(self.poses, value))
-        }))
-    }
-}
-
-/// Steps all boards and compares them with float.
-pub(crate) fn measure(options: &Options, session: &Session) -> Result<Outcome> {
-    let common = session.emulated();
-    let mut start = Start::load(&options.start)?;
-    let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
-    let mut opened = start.open(&original, &common, session)?;
-    session.expect(u64::from(start.steps) * (options.builds.len() as u64 + 1));
-    let mut complete = start.step_to(&mut opened, session)?;
-
-    let start = &start;
-    let moving = moving(start.bodies(), start.shapes());
-    let mut float = Side::new(opened, start)?;
-    let (mut sides, mut builds) = (Vec::new(), Vec::new());
-    for build in &options.builds {
-        let about = |failure: Failure| failure.about(format!("board {build}"));
-        sides.push(Some(Side::of(build, &common, start, session).map_err(about)?));
-        let build = build.to_string();
-        builds.push(OfBuild { build, curve: Vec::new(), position_histogram: None, failed: None });
-    }
-    let mut energies = vec![float.run.kinetic_energy()];
-    let mut unmoved = Vec::new();
-    'steps: for step in 1..=start.steps {
-        let Some(share) = float.step(start, &moving, session)? else {
-            complete = false;
-            break;
-        };
-        let energy = float.run.kinetic_energy();
-        energies.push(energy);
-        unmoved.push(share);
-        for (place, of_build) in sides.iter_mut().zip(&mut builds) {
-            let Some(side) = place else { continue };
-            match side.step(start, &moving, session) {
-                Ok(Some(share)) => {
-                    let kinetic_energy_j = side.run.kinetic_energy();
-                    of_build.curve.push(Point {
-                        step,
-                        state: StateDeviation::of(float.run.bodies(), side.run.bodies(), &moving),
-                        kinetic_energy_j,
-                        energy_ratio: (energy > 0.0).then(|| kinetic_energy_j / energy),
-                        unmoved_share: share,
-                    });
-                }
-                Ok(None) => {
-                    complete = false;
-                    break 'steps;
-                }
-                Err(failure) => {
-                    of_build.failed = Some(Failed { step, error: failure.chain() });
-                    *place = None;
-                }
-            }
+        part.fact("recorded", HALF_AGAINST_FLOAT.text());
+        let positions = |side: &Side| side.deviations(&sides[0], |body| body.pose.position);
+        let whole = sides[1..].iter().filter(|side| complete && side.failed.is_none());
+        let positions: Vec<(&str, Deviations)> =
+            whole.map(|side| (side.name.as_str(), positions(side))).collect();
+        let rows: Vec<_> = positions.iter().map(|(name, of)| (*name, of)).collect();
+        part.tables.extend([Deviations::table(&rows), splits::table(&splits)]);
+        let shown = Shown { subject: start.subject(), sides: &sides };
+        match start.steps {
+            1 => shown.add_positions(&mut part, &positions, &splits),
+            _ => shown.add_energies(&mut part),
         }
+        Ok(part)
     }
-    session.end();
-    for (side, of_build) in sides.iter().zip(&mut builds) {
-        of_build.position_histogram = side.as_ref().filter(|_| complete).map(|side| {
-            let field = |body: &zynq_pgs::Body| body.pose.position;
-            Histogram::of(components(float.run.bodies(), side.run.bodies(), &moving, field))
-        });
-    }
-    let mut of_splits = match options.start.input {
-        // The folder's collisions belong to the state before the step.
-        Some(_) => start.run(None)?,
-        None => float.run,
-    };
-    Ok(Outcome {
-        config: start.to_json(),
-        complete,
-        float_kinetic_energy_j: energies,
-        float_unmoved_share: unmoved,
-        builds,
-        splits: splits::of(&start.numbers(&mut of_splits)),
-        recorded: [HALF_AGAINST_FLOAT],
-        start_text: start.text(),
-        subject: start.subject(),
-    })
 }

@@ -9,26 +9,22 @@
 //!
 //! Source: `bitstream-model/README.md`, the formulae of both passes.
 
-use serde::Serialize;
 use zynq_pgs::{Body, Collision, Impulses, Shape, StepParameters};
 
 /// Beyond this z the tangents of a normal are made from y and z.
 const TANGENT_Z: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The sizes of a residual over all of its rows, m/s.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Residual {
     pub(crate) largest: f64,
     pub(crate) rms: f64,
 }
 
 /// Both kinds of residual.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Residuals {
-    /// The contacts' residual, by the minimum of both sides.
     pub(crate) contact: Residual,
-    /// The same by the Fischer-Burmeister function of both sides.
-    pub(crate) fischer_burmeister: Residual,
     pub(crate) friction: Residual,
 }
 
@@ -90,8 +86,7 @@ impl Problem {
 
     /// The residuals of a state.
     pub(super) fn residuals(&self, bodies: &[Body], impulses: &[Impulses]) -> Residuals {
-        let (mut contact, mut burmeister, mut friction) =
-            (Sum::default(), Sum::default(), Sum::default());
+        let (mut contact, mut friction) = (Sum::default(), Sum::default());
         for row in &self.rows {
             let of = impulses.get(row.collision).copied().unwrap_or(Impulses::ZERO);
             let speed = row.speed(bodies) + row.bias;
@@ -99,22 +94,17 @@ impl Problem {
                 Part::Point(point) => {
                     let other = f64::from(of.normal[point]) / row.mass;
                     contact.add(if speed < other { speed } else { other });
-                    burmeister.add(other + speed - (other * other + speed * speed).sqrt());
                 }
                 Part::Tangent(tangent) => {
                     let sum = of.normal.iter().fold(0.0, |sum, impulse| sum + f64::from(*impulse));
                     let limit = self.friction * sum;
                     let impulse = f64::from(of.friction[tangent]);
                     let wanted = impulse - row.mass * speed;
-                    friction.add((impulse - clamped(wanted, limit)) / row.mass);
+                    friction.add((impulse - wanted.max(-limit).min(limit)) / row.mass);
                 }
             }
         }
-        Residuals {
-            contact: contact.residual(),
-            fischer_burmeister: burmeister.residual(),
-            friction: friction.residual(),
-        }
+        Residuals { contact: contact.residual(), friction: friction.residual() }
     }
 }
 
@@ -203,17 +193,6 @@ fn tangents(n: [f64; 3]) -> [[f64; 3]; 2] {
     }
 }
 
-/// Clamps to both sides of 0.
-fn clamped(value: f64, limit: f64) -> f64 {
-    if value > limit {
-        limit
-    } else if value < -limit {
-        -limit
-    } else {
-        value
-    }
-}
-
 /// The sum of a residual's rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
@@ -281,7 +260,6 @@ mod tests {
         let (bodies, problem) = problem(2.0, 0.0);
         let unsolved = problem.residuals(&bodies, &impulse(0.0, [0.0; 2]));
         assert!((unsolved.contact.largest - 2.0).abs() < 1e-6, "{unsolved:?}");
-        assert!((unsolved.fischer_burmeister.largest - 4.0).abs() < 1e-6, "{unsolved:?}");
     }
 
     #[test]

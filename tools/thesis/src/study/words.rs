@@ -10,7 +10,7 @@ use crate::narrow::NarrowFormat;
 
 /// Takes a step. A number that the words do not hold ends it in a sentence; nothing has changed
 /// then.
-pub(super) fn step(
+pub(crate) fn step(
     format: NarrowFormat,
     bodies: &mut [Body],
     shapes: &[Shape],
