@@ -95,7 +95,7 @@ pub const DESIGNS: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WI
 /// beside the passes. Pass k of a kind runs on unit k modulo the number of units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// Units that run contact passes, and as many that run friction passes.
+    /// Units that run contact passes; friction passes have the same number.
     pub units: u32,
     /// Places for live bodies over all units. Each unit keeps the bodies in its passes in a memory
     /// of its share.
