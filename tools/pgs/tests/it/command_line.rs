@@ -226,7 +226,7 @@ fn two_runs_have_one_digest_and_another_scene_has_another() {
     let first = digest(&scene);
     assert!(first.starts_with("digest     fnv1a-64 "), "{first}");
     assert_eq!(first, digest(&scene[1..]), "without the verb");
-    assert_ne!(first, digest(&[&scene[..], &["--cube-inertia", "textbook"]].concat()));
+    assert_ne!(first, digest(&["run", "--grid", "3x3x4", "--steps", "5", "--drop", "0"]));
 }
 
 #[test]
