@@ -24,7 +24,8 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the arrays.
+    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the
+    /// arrays.
     #[arg(
         long,
         value_name = "FILE.npz|glb",
