@@ -28,13 +28,13 @@ pub const OPERATORS: &[Source<'_>] = sources! {
 
 /// All other hand-written modules, each after the modules that it is made of.
 pub const AROUND: &[Source<'_>] = sources! {
-    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "simple_dual_port",
+    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "ram_tile", "ram_lane",
         "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";
     "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator", "step_sequence";
     "operators/": "half_to_float";
-    "pass/": "finder", "issue", "pair_matrix", "queue_records", "queue_hazard", "queue", "issue_numbers",
-        "impulses", "impulse_sum";
+    "pass/": "finder", "issue", "queue_records", "queue_hazard", "queue_first", "queue",
+        "issue_numbers", "impulses", "impulse_sum";
     "": "core", "control_block", "pgs_top";
 };
 
