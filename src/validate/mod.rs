@@ -119,7 +119,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         let collision = collisions.collision(index);
         check_whole(index, &collision, end, &scene)?;
         if parameters.warm_start {
-            check_impulses(index, &collisions.impulses(index).used(collision.count), &scene)?;
+            let impulses = collisions.impulses(index, collision.normal).used(collision.count);
+            check_impulses(index, &impulses, &scene)?;
         }
     }
     Ok(())
