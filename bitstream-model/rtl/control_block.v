@@ -1,9 +1,11 @@
 // The registers of the accelerator (specification, section 4) behind AXI4-Lite.
 //
-// Offsets, capabilities and reset values come from the generated headers. Addresses and written data
-// are registered before anything looks at them: a read is answered in the third cycle after its
-// address, and a write takes effect in the second one. An AXI access of less than 32 bits does not
-// exist here: strobes are ignored, as the specification allows 32 bits only.
+// Offsets, capabilities and reset values come from the generated headers. Each READY is a register's
+// and follows no VALID. Addresses and written data are registered before anything looks at them: a
+// read is answered in the third cycle after its address, and a write takes effect in the second one
+// after the later of its two parts. The specification allows 32 bits only: a write without all four
+// strobes has no effect. It is answered OKAY like every access, since an error response to a
+// write is an SError of the processors, which ends their kernel.
 `default_nettype none
 
 module control_block (
@@ -14,6 +16,7 @@ module control_block (
   input  wire        awvalid,
   output wire        awready,
   input  wire [31:0] wdata,
+  input  wire [3:0]  wstrb,
   input  wire        wvalid,
   output wire        wready,
   output reg         bvalid,
@@ -96,21 +99,22 @@ module control_block (
   wire       running = busy | go | check | start;
   assign starting = go | check | start | refused | done | done_late;
 
-  reg         writing;               // the registered write takes effect
+  reg         has_address, has_data;  // of a write
+  reg         whole;                 // the data are four bytes
   reg  [11:0] write_address;
   reg  [31:0] write_data;
   reg         reading;               // a read is under way
   reg         read_s1, read_s2;
   reg  [11:0] read_address;
-  wire        writes     = awvalid & wvalid & ~bvalid;
-  wire        write_here = writing & ~resetting;
+  wire        writes     = has_address & has_data & ~bvalid;  // the registered write is done
+  wire        write_here = writes & whole & ~resetting;
   wire        reads      = arvalid & ~reading;
-  assign awready = writes;
-  assign wready  = writes;
-  assign arready = reads;
+  assign awready = ~has_address;
+  assign wready  = ~has_data;
+  assign arready = ~reading;
 
-  wire shape_space_w = write_address[11:10] == SHAPE_TABLE[11:10];
-  wire shape_space_r = read_address[11:10] == SHAPE_TABLE[11:10];
+  wire shape_space_w = (write_address[11:10] == SHAPE_TABLE[11:10]) & (write_address[1:0] == 2'd0);
+  wire shape_space_r = (read_address[11:10] == SHAPE_TABLE[11:10]) & (read_address[1:0] == 2'd0);
 
   always @(posedge clk) begin
     // The memory that the arguments need, and their checks, in registers: settled long before a start.
@@ -163,7 +167,7 @@ module control_block (
       done_bit  <= 1'b0;
       ready_bit <= 1'b0;
     end
-    isr <= (isr ^ (isr_write ? write_data[2:0] & ier : 3'b000)) | raised;
+    isr <= (isr ^ (isr_write ? write_data[2:0] : 3'b000)) | raised;
     done_late <= done;
     if (done_late) begin
       last_cycles        <= cycles;
@@ -176,10 +180,11 @@ module control_block (
     end
 
     // Writes.
-    writing       <= writes;
-    write_address <= awaddr;
-    write_data    <= wdata;
-    shape_write   <= 2'b00;
+    if (~has_address) write_address <= awaddr;
+    if (~has_data) {whole, write_data} <= {&wstrb, wdata};
+    has_address <= ~writes & (has_address | awvalid);
+    has_data    <= ~writes & (has_data | wvalid);
+    shape_write <= 2'b00;
     if (bready) bvalid <= 1'b0;
     if (writes) bvalid <= 1'b1;
     if (write_here) begin
@@ -235,7 +240,7 @@ module control_block (
       spin_damping                                <= RESET_SPIN_DAMPING;
     end
     if (~resetn) begin
-      {bvalid, writing, done_late} <= 3'b000;
+      {bvalid, has_address, has_data, done_late} <= 4'b0000;
       {last_cycles, last_impulse_total}                    <= 128'd0;
       {last_work, last_wait, last_hazards}                 <= 96'd0;
       {last_received, last_sent}                           <= 64'd0;

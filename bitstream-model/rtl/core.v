@@ -132,7 +132,6 @@ module core (
   wire [20:0]  wrong_beat [0:3];
   wire [7:0]   wrong_code [0:3];
   wire [3:0]   pop, wrong, collision_begins;
-  wire         unused = &{1'b0, collision_begins[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
@@ -194,6 +193,7 @@ module core (
   wire            ends;                // results are there
   wire [3:0]      room;                // for a row of each stream out
   reg             second;              // a collision was issued in the cycle before
+  wire            unused = &{1'b0, collision_begins[3], body_pose[127:96], rows[127:96], rows[255:224], rows[383:352]};
 
   wire               found;
   wire [COLLISION:0] last_use_a, last_use_b;
@@ -314,6 +314,7 @@ module core (
   endgenerate
 
   // Each of these is there in its own part of the step only.
+  wire pop_even, pop_odd;              // pairs of streams, to the integration
   assign pop = {{2{load_pops[1] | pop_odd}}, {2{load_pops[0] | pop_even}}}
              | {takes_first | (takes_rest & next_warm), {3{takes_first | takes_rest}}};
 
@@ -470,7 +471,6 @@ module core (
 
   // ---- Integration and streams out
 
-  wire         pop_even, pop_odd;
   wire         body_valid, body_free;
   wire [31:0]  body_damping;
   integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (

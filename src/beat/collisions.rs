@@ -123,7 +123,9 @@ fn pack_range<C: Collisions + ?Sized>(
                 packer.write(&copies, &IN_ARRAY, block.len());
             }
         }
-        packer.write_impulses(block.len(), |at, normal| collisions.impulses(first + at, normal));
+        packer.write_impulses(block.len(), |at, normal, points| {
+            collisions.impulses(first + at, normal, points)
+        });
     }
     packer.finish()
 }
@@ -248,9 +250,13 @@ impl<'a> CollisionPacker<'a> {
     }
 
     /// Writes the impulses of the `count` collisions that were written last: `impulses` has them, by
-    /// the place of a collision among these, and its normal.
+    /// the place of a collision among these, its normal and number of points.
     #[inline]
-    fn write_impulses(&mut self, count: usize, impulses: impl Fn(usize, [f32; 3]) -> Impulses) {
+    fn write_impulses(
+        &mut self,
+        count: usize,
+        impulses: impl Fn(usize, [f32; 3], u32) -> Impulses,
+    ) {
         let Self { warm: Some(warm), dealer, rows, halves, beats, .. } = self else { return };
         warm.take(&rows[..count], impulses);
         let all = match dealer.layout.format {

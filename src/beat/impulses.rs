@@ -107,14 +107,15 @@ impl<'a> WarmDealer<'a> {
     pub(super) fn take(
         &mut self,
         records: &[[Beat; collision::ROWS]],
-        impulses: impl Fn(usize, [f32; 3]) -> Impulses,
+        impulses: impl Fn(usize, [f32; 3], u32) -> Impulses,
     ) {
         let [contact, friction] = &mut self.kinds;
         let [mut of_contact, mut of_friction] = self.largest;
         let rows = records.iter().zip(contact.iter_mut().zip(friction));
         for (at, (record, ([normal], [tangential]))) in rows.enumerate() {
             let [x, y, z, count] = record[collision::NORMAL].0;
-            let impulses = impulses(at, [x, y, z].map(f32::from_bits));
+            let points = count & !collision::FRICTION_BITS;
+            let impulses = impulses(at, [x, y, z].map(f32::from_bits), points);
             [*normal, *tangential] = rows_of(&impulses, count);
             of_contact.see(*normal);
             of_friction.see(*tangential);

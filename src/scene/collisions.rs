@@ -53,9 +53,9 @@ pub trait Collisions: Sync {
 
     /// The impulses with which collision `index` begins in a step with
     /// [`StepParameters::warm_start`](crate::StepParameters::warm_start); `index` is below
-    /// [`len`](Self::len), and `normal` is the normal of the collision.
-    fn impulses(&self, index: usize, normal: [f32; 3]) -> Impulses {
-        let _ = (index, normal);
+    /// [`len`](Self::len), and the collision has this normal and number of contact points.
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        let _ = (index, normal, points);
         Impulses::ZERO
     }
 }
@@ -132,8 +132,8 @@ impl<C: Collisions + ?Sized> Collisions for &C {
     }
 
     #[inline]
-    fn impulses(&self, index: usize, normal: [f32; 3]) -> Impulses {
-        C::impulses(self, index, normal)
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        C::impulses(self, index, normal, points)
     }
 }
 
@@ -215,7 +215,7 @@ impl<C: Collisions + ?Sized> Collisions for WarmCollisions<'_, C> {
     }
 
     #[inline]
-    fn impulses(&self, index: usize, _: [f32; 3]) -> Impulses {
+    fn impulses(&self, index: usize, _: [f32; 3], _: u32) -> Impulses {
         self.impulses[index]
     }
 }

@@ -146,16 +146,18 @@ struct Kept {
     on_a: [f32; 3],
     first: f32,
     second: f32,
+    /// The number of its points.
+    points: u32,
 }
 
 impl Kept {
     #[inline]
-    fn new(impulses: &Impulses, normal: [f32; 3]) -> Self {
+    fn new(impulses: &Impulses, normal: [f32; 3], points: u32) -> Self {
         let Impulses { normal: impulses, friction: [first, second] } = *impulses;
         // Without friction it may have no contact points, and so no right normal.
         let none = (first == 0.0) & (second == 0.0);
         let on_a = if none { [0.0; 3] } else { in_world(normal, (first, second)) };
-        Self { impulses, normal, on_a, first, second }
+        Self { impulses, normal, on_a, first, second, points }
     }
 
     /// The impulses of some of its points, and 0 of a new one.
@@ -177,6 +179,15 @@ impl Kept {
         let ([a, b, c], [x, y, z]) = (self.normal, normal);
         if (a * x + b * y) + c * z < 0.0 { (-first, -second) } else { (first, second) }
     }
+
+    /// The share of the friction that the points of a collision of `points` have, at their places.
+    #[cold]
+    #[allow(clippy::cast_precision_loss, reason = "at most four points")]
+    fn share(&self, points: u32, places: [u8; CONTACT_POINTS]) -> f32 {
+        let was = |(at, place): (u32, u8)| (at < points) & (u32::from(place) < self.points);
+        let stayed: u32 = (0..).zip(places).map(|point| u32::from(was(point))).sum();
+        if stayed == self.points { 1.0 } else { stayed as f32 / self.points as f32 }
+    }
 }
 
 impl LastStep {
@@ -184,8 +195,10 @@ impl LastStep {
     /// places: one for each collision.
     ///
     /// Friction turns with the normal: it is as it was in the world, in the plane of the new
-    /// normal. Bodies A and B may have changed places, and the bodies may have other indices. Two
-    /// collisions that name one place both begin with its impulses.
+    /// normal. Bodies A and B may have changed places, and the bodies may have other indices. Each
+    /// point has an equal share of its collision's friction: a point that has gone takes its share
+    /// along, and where two collisions have points of one place, each begins with the shares of
+    /// its own.
     ///
     /// # Errors
     /// [`InputError::UnequalLengths`]: another number of places than of collisions.
@@ -233,7 +246,8 @@ impl LastStep {
         self.kept.clear();
         self.kept.reserve(impulses.len());
         for (index, impulses) in impulses.iter().enumerate() {
-            self.kept.push(Kept::new(impulses, collisions.collision(index).normal));
+            let collision = collisions.collision(index);
+            self.kept.push(Kept::new(impulses, collision.normal, collision.points()));
         }
         Ok(())
     }
@@ -273,17 +287,22 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
     }
 
     #[inline(always)]
-    fn impulses(&self, index: usize, normal: [f32; 3]) -> Impulses {
-        let Some(Place { collision, points }) = self.places.get(index) else {
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        let Some(Place { collision, points: places }) = self.places.get(index) else {
             return Impulses::ZERO;
         };
         let Some(kept) = self.kept.get(*collision as usize) else {
             return Impulses::ZERO;
         };
-        let same = *points == Place::same(0).points;
-        let normal_impulses = if same { kept.impulses } else { kept.at(*points) };
+        let same = *places == Place::same(0).points;
+        let known = if same { kept.impulses } else { kept.at(*places) };
         let (first, second) = kept.turned(normal);
-        Impulses { normal: normal_impulses, friction: [first, second] }.scaled(self.factor)
+        let mut friction = [first, second];
+        if !same | (points < kept.points) {
+            let share = kept.share(points, *places);
+            friction = [first * share, second * share];
+        }
+        Impulses { normal: known, friction }.scaled(self.factor)
     }
 }
 
@@ -315,7 +334,7 @@ mod tests {
         let mut last = LastStep::default();
         last.commit(&[collision(old, &[])], &[IMPULSES]).expect("one collision");
         let turned = [collision(new, &[])];
-        last.placed(&turned, &[Place::same(0)], 1.0).expect("its place").impulses(0, new)
+        last.placed(&turned, &[Place::same(0)], 1.0).expect("its place").impulses(0, new, 0)
     }
 
     #[test]
@@ -354,7 +373,7 @@ mod tests {
         let new = [collision([0.0, 1.0, 0.0], &[])];
         let places = [Place::same(0)];
         let placed = last.placed(&new, &places, 1.0).expect("its place");
-        assert_eq!(placed.impulses(0, new[0].normal), Impulses::ZERO);
+        assert_eq!(placed.impulses(0, new[0].normal, 0), Impulses::ZERO);
     }
 
     #[test]

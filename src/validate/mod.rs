@@ -119,7 +119,8 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
         let collision = collisions.collision(index);
         check_whole(index, &collision, end, &scene)?;
         if parameters.warm_start {
-            let impulses = collisions.impulses(index, collision.normal).used(collision.count);
+            let (normal, points) = (collision.normal, collision.points());
+            let impulses = collisions.impulses(index, normal, points).used(collision.count);
             check_impulses(index, &impulses, &scene)?;
         }
     }

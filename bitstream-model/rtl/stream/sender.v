@@ -4,6 +4,9 @@
 //
 // A body that enters the integration takes a credit of every sender, and a collision whose impulses go out
 // one of sender 0, long before its row arrives. A beat that leaves gives it back.
+//
+// An error stops the rows, but a beat that is offered stays until it is taken, as AXI4-Stream asks. RESET
+// withdraws it: the beat would be the first one of the next packet.
 `default_nettype none
 
 module sender #(
@@ -11,7 +14,7 @@ module sender #(
 ) (
   input  wire         clk,
   input  wire         clear,    // reset, or a step begins
-  input  wire         stop,     // the step has an error: no more rows leave
+  input  wire         stop,     // the step has an error: no more rows are offered
   input  wire [19:0]  bodies,
 
   input  wire         enters,   // a body enters the integration, or a collision its last pass
@@ -35,6 +38,9 @@ module sender #(
   reg              row_is_last, one_row;
   reg              taken, given;     // a credit, in the cycle before; a beat gives one as it leaves
   reg              last_left;        // the beat in the cycle before was the last one
+  reg              stopped;          // nothing is offered until the next step
+  wire             there;            // a row in the FIFO
+  assign           tvalid = there & ~stopped;
   wire             leaves = tvalid & tready;
 
   always @(posedge clk) begin
@@ -48,6 +54,7 @@ module sender #(
       rows_left    <= bodies;
       row_is_last  <= one_row;
       finished     <= 1'b0;
+      stopped      <= 1'b0;
     end else begin
       if (taken & ~given) credits <= credits - 1'b1;
       if (given & ~taken) credits <= credits + 1'b1;
@@ -58,12 +65,13 @@ module sender #(
         row_is_last <= rows_left == 20'd2;
       end
       if (last_left) finished <= 1'b1;
+      if (stop & (~tvalid | tready)) stopped <= 1'b1;
     end
   end
 
   block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
-    .clk(clk), .clear(clear | stop), .push(push), .in({row_is_last & result, row}), .pop(leaves),
-    .head({tlast, tdata}), .some(tvalid)
+    .clk(clk), .clear(clear), .push(push), .in({row_is_last & result, row}), .pop(leaves),
+    .head({tlast, tdata}), .some(there)
   );
 
   word_sum words (

@@ -20,6 +20,9 @@ use pgs_interface::profile::{Depth, Inertia, Variant};
 use super::integrate::Integration;
 use super::solver::SolverParameters;
 
+/// The bits of IER and ISR.
+const CAUSES: u32 = irq::DONE.mask() | irq::READY.mask() | irq::ERROR.mask();
+
 /// A counter of 32 bits, which saturates.
 fn counter(count: u64) -> u32 {
     register(count.min(COUNTER_MAX.into()))
@@ -343,7 +346,7 @@ impl Registers {
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
-            _ if offset == QUEUE.offset => config.queue_depth(),
+            _ if offset == QUEUE.offset => config.quirks.queue.unwrap_or(config.queue_depth()),
             _ if offset == FENCE_BASE.offset => Fence::to_registers(config.fence)[0],
             _ if offset == FENCE_SIZE.offset => Fence::to_registers(config.fence)[1],
             _ if offset == ERROR.offset => self.error,
@@ -394,10 +397,8 @@ impl Registers {
             }
             _ if offset == AP_CTRL.offset => {}
             _ if offset == GIE.offset => self.gie = value & 1 != 0,
-            _ if offset == IER.offset => {
-                self.ier = value & (irq::DONE.mask() | irq::READY.mask() | irq::ERROR.mask());
-            }
-            _ if offset == ISR.offset => self.isr ^= value & self.ier,
+            _ if offset == IER.offset => self.ier = value & CAUSES,
+            _ if offset == ISR.offset => self.isr ^= value & CAUSES,
             _ if ARGUMENTS.contains(&offset) => self.arguments[offset as usize / 4] = value,
             _ if offset == RESET.offset && value & 1 != 0 => return Some(Request::Reset),
             _ => {

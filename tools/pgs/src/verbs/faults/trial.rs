@@ -163,7 +163,7 @@ impl State {
     /// A pile of cubes some steps after its drop, on a board without faults.
     fn settled(side: u16, config: BoardConfig, start: Start) -> Result<Self> {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
-        let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.05 };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
         let parameters = start.parameters();
@@ -181,8 +181,11 @@ impl State {
         let mut after = Vec::new();
         let collisions = scene.collisions().to_vec();
         let placed = warm.placed(&collisions, 1.0).map_err(Failure::input)?;
-        let impulses: Vec<_> =
-            collisions.iter().enumerate().map(|(at, of)| placed.impulses(at, of.normal)).collect();
+        let impulses: Vec<_> = collisions
+            .iter()
+            .enumerate()
+            .map(|(at, of)| placed.impulses(at, of.normal, of.points()))
+            .collect();
         let (port, mut takes) = (emulated.cpu_port(), Duration::ZERO);
         // From the second step on the channels are running.
         for _ in 0..2 {
