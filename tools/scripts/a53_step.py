@@ -36,7 +36,7 @@ HOST = ("points", "order", "pack", "bodies", "results", "commit", "driver")
 # Parts that are told of a body; the others are told of a collision.
 OF_BODIES = ("bodies", "results")
 # Aarch64 instructions a collision that a step may take at most; packing has the beats of the bodies in it.
-BUDGET = {"order": 5, "cold": 155, "warm": 430}
+BUDGET = {"order": 5, "cold": 148, "warm": 265}
 
 
 def count(pgs, plugin, arguments):
