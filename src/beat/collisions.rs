@@ -76,21 +76,36 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     warm: Option<WarmSegments<'_>>,
     packers: &mut PackPool,
 ) -> Packed {
-    let scene = target.scene;
+    let work = |part: Part<'_>| pack_range(entries, part);
+    let Entries { count, added, .. } = *entries;
+    let mut packed = pack_parts((target.scene, ends), count, channels, warm, packers, &work);
+    packed.good &= added.is_none_or(|added| added == packed.paddings);
+    packed
+}
+
+/// A range of entries, and their packer.
+type Part<'a> = (Range<usize>, CollisionPacker<'a>);
+
+/// [`pack_collisions`] by the work on each range.
+fn pack_parts<'a>(
+    (scene, ends): (&'a Scene<'a>, Ends<'a>),
+    count: usize,
+    channels: &'a mut [&mut [Beat]],
+    mut warm: Option<WarmSegments<'a>>,
+    packers: &mut PackPool,
+    work: &(dyn Fn(Part<'a>) -> Packed + Sync),
+) -> Packed {
     let mut packed = Packed::NOTHING;
     let channels = whole(channels);
     let cut = |size| {
         let layout = Segment::Collisions.layout(scene.variant);
         let mut pieces = ChannelChunks::new(&layout, size, channels);
-        let mut warm = warm;
-        ranges(entries.count, size).map(move |range| {
+        ranges(count, size).map(move |range| {
             let warm = warm.as_mut().map(|warm| warm.cut(scene.variant, size));
             (range, CollisionPacker::new(scene, ends, pieces.cut(), warm))
         })
     };
-    let work = |(range, packer)| pack_range(entries, range, packer);
-    packers.each(entries.count, cut, work, |of_range| packed = packed.and(of_range));
-    packed.good &= entries.added.is_none_or(|added| added == packed.paddings);
+    packers.each(count, cut, work, |of_range| packed = packed.and(of_range));
     packed
 }
 
@@ -101,8 +116,7 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
 /// structures is not `count`.
 fn pack_range<C: Collisions + ?Sized>(
     entries: &Entries<'_, C>,
-    range: Range<usize>,
-    mut packer: CollisionPacker<'_>,
+    (range, mut packer): Part<'_>,
 ) -> Packed {
     let Entries { collisions, count, .. } = *entries;
     let lying = collisions.structures().filter(|all| all.len() == count);
@@ -237,8 +251,14 @@ impl<'a> CollisionPacker<'a> {
             paddings += usize::from(padding);
         }
         good &= largest.are_within(scene.held.collisions.largest());
-        if scene.computes_short_rows() {
-            good &= places[..count].iter().all(|place| scene.rows_fit(at(all, *place), ends));
+        if let Some(bounds) = &scene.short_rows {
+            let mut positions = Magnitudes::default();
+            for rows in &self.rows[..count] {
+                positions.see(rows[collision::BODY_A]);
+                positions.see(rows[collision::BODY_B]);
+            }
+            good &= bounds.all_fit(largest, positions)
+                || places[..count].iter().all(|place| scene.rows_fit(at(all, *place), ends));
         }
         self.good &= good;
         self.paddings += paddings;

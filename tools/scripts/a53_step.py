@@ -29,7 +29,7 @@ PARTS = {
     "results": ["8zynq_pgs4beat7results", "8zynq_pgs4step7results", "8zynq_pgs6record6result", "4beat4deal6Joiner"],
     "commit": ["8zynq_pgs4step8impulses", "8LastStep6commit", "4beat4deal12sum_of_words"],
     "pack": ["8zynq_pgs4beat", "8zynq_pgs6record", "8zynq_pgs5scene", "last_step"],
-    "driver": ["8zynq_pgs4step", "8zynq_pgs5board", "8zynq_pgs8axi_dma", "8zynq_pgs13control_block"],
+    "driver": ["8zynq_pgs4step", "8zynq_pgs8validate", "8zynq_pgs5board", "8zynq_pgs8axi_dma", "8zynq_pgs13control_block"],
     "lanes": ["15bitstream_model4fast", "11pgs_support"],
 }
 HOST = ("points", "order", "pack", "bodies", "results", "commit", "driver")

@@ -345,7 +345,8 @@ class Issue:
         while queue:
             oldest = queue[0]
             free = [index for index in queue if self.is_free(index)]
-            self.met.update(set(queue) - set(free))
+            if patience == 0 and oldest not in free:
+                self.met.add(oldest)
             if patience >= 4 * self.window:
                 free = [index for index in free if index == oldest or not self.moving(index) & self.moving(oldest)]
             patience += 1
