@@ -121,7 +121,6 @@ fn pack_range<C: Collisions + ?Sized>(
     let Entries { collisions, count, .. } = *entries;
     let lying = collisions.structures().filter(|all| all.len() == count);
     let mut copies = [Collision::NOTHING; BLOCK];
-    let mut impulses = [Impulses::ZERO; BLOCK];
     for first in range.clone().step_by(BLOCK) {
         let block = first..range.end.min(first + BLOCK);
         match lying {
@@ -138,11 +137,9 @@ fn pack_range<C: Collisions + ?Sized>(
                 packer.write(&copies, &IN_ARRAY, block.len());
             }
         }
-        if packer.warm.is_some() {
-            let impulses = &mut impulses[..block.len()];
-            impulses.iter_mut().zip(block).for_each(|(to, index)| *to = collisions.impulses(index));
-            packer.write_impulses(impulses);
-        }
+        packer.write_impulses(block.len(), |at, normal, points| {
+            collisions.impulses(first + at, normal, points)
+        });
     }
     packer.finish()
 }
@@ -272,23 +269,30 @@ impl<'a> CollisionPacker<'a> {
         dealer.write(beats);
     }
 
-    /// Writes the impulses of the collisions that were written last.
-    pub(crate) fn write_impulses(&mut self, impulses: &[Impulses]) {
+    /// Writes the impulses of the `count` collisions that were written last: `impulses` has them, by
+    /// the place of a collision among these, its normal and number of points.
+    #[inline]
+    fn write_impulses(
+        &mut self,
+        count: usize,
+        impulses: impl Fn(usize, [f32; 3], u32) -> Impulses,
+    ) {
         let Self { warm: Some(warm), dealer, rows, halves, beats, .. } = self else { return };
+        warm.take(&rows[..count], impulses);
         let all = match dealer.layout.format {
             StreamFormat::F32 => rows.as_flattened(),
             StreamFormat::Binary16 => halves.as_flattened(),
         };
-        warm.write(&all[..*beats], rows, impulses);
+        warm.write(&all[..*beats], count);
     }
 
     /// Ends the segments.
-    pub(crate) fn finish(self) -> Packed {
-        let Self { dealer, warm, good, paddings, .. } = self;
-        let limit = self.scene.held.impulses.largest();
-        let good = good && warm.as_ref().is_none_or(|warm| warm.are_within(limit));
-        let warm = warm.map_or(WarmSums::NONE, |warm| warm.sums());
-        Packed { sum: dealer.sum(), warm, good, paddings }
+    pub(crate) fn finish(&self) -> Packed {
+        let Self { scene, dealer, warm, good, paddings, .. } = self;
+        let limit = scene.held.impulses.largest();
+        let good = *good && warm.as_ref().is_none_or(|warm| warm.are_within(limit));
+        let warm = warm.as_ref().map_or(WarmSums::NONE, WarmDealer::sums);
+        Packed { sum: dealer.sum(), warm, good, paddings: *paddings }
     }
 }
 

@@ -228,7 +228,9 @@ impl<'a> Scene<'a> {
             let collision = collisions.collision(index);
             check_whole(index, &collision, &end, self)?;
             if warm {
-                check_impulses(index, &collisions.impulses(index).used(collision.count), self)?;
+                let (normal, points) = (collision.normal, collision.points());
+                let impulses = collisions.impulses(index, normal, points).used(collision.count);
+                check_impulses(index, &impulses, self)?;
             }
         }
         Ok(())

@@ -41,7 +41,8 @@ pack=$(built pack)
 speed=$(built speed)
 
 # All of packing is in the first of these functions, all that the board does in the last.
-packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::bodies::BodyPacker::write')
+packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::impulses::WarmDealer::write'
+	'zynq_pgs::beat::bodies::BodyPacker::write')
 board='bitstream_model::board::Board::advance'
 log=$(mktemp)
 litter+=("$log")

@@ -24,10 +24,10 @@ const PARTS: [(&str, Of, [[f64; 2]; 2]); 8] = [
     ("detection", Of::Collision, [[936.0, 873.0], [870.0, 870.0]]),
     ("points", Of::Collision, [[0.0, 129.0], [0.0, 141.0]]),
     ("order", Of::Collision, [[1.4, 1.4], [1.3, 1.3]]),
-    ("pack", Of::Collision, [[257.0, 569.0], [352.0, 590.0]]),
+    ("pack", Of::Collision, [[242.0, 484.0], [337.0, 560.0]]),
     ("bodies", Of::Body, [[119.0, 119.0], [130.0, 130.0]]),
-    ("results", Of::Body, [[49.0, 49.0], [48.0, 48.0]]),
-    ("commit", Of::Collision, [[0.0, 104.0], [0.0, 136.0]]),
+    ("results", Of::Body, [[75.0, 75.0], [74.0, 74.0]]),
+    ("commit", Of::Collision, [[0.0, 194.0], [0.0, 205.0]]),
     ("driver", Of::Collision, [[7.4, 12.4], [1.0, 1.4]]),
 ];
 
