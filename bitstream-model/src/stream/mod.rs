@@ -95,7 +95,7 @@ impl Stream {
         self.ring[..beats.len() - first].copy_from_slice(&beats[first..]);
     }
 
-    /// A stream whose beats are counted, and whose words nobody reads.
+    /// A stream whose beats are counted, and whose words are not read.
     pub(crate) fn unread() -> Self {
         Self { depth: usize::MAX, ..Self::new(1) }
     }

@@ -76,7 +76,7 @@ impl Args for ThesisArgs {
                     AcceleratorOptions::augment_args(BoardOptions::augment_args(command))
                 }
             };
-            // Last: options bring what is said of them, too.
+            // Last, because options bring texts of their own.
             command.about(experiment.about).long_about(None)
         });
         AllArgs::augment_args(command)

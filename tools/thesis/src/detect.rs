@@ -84,7 +84,7 @@ impl Measure for DetectionArgs {
     }
 }
 
-/// Lets the driver refuse collisions that are none; nobody looks at the solution.
+/// Lets the driver refuse collisions that are none. The solution is not used.
 fn check(step: &GivenStep, session: &Session) -> Result<()> {
     let mut opened = board::open(&session.emulated(), &Build::default())?;
     let mut solve = || {

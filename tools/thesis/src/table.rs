@@ -1,4 +1,4 @@
-//! The origin of a row's figures; the tables are those of every command.
+//! The origin of a row's figures, beside the tables of every command.
 
 pub(crate) use pgs_command::output::table::{Cell, Table, anchor, escaped, text};
 

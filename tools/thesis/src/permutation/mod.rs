@@ -122,7 +122,7 @@ pub(crate) fn shuffled(random: &mut SplitMix64, count: usize) -> Vec<u32> {
 ///
 /// # Errors
 ///
-/// Fails where the file is no permutation of that many indices.
+/// Fails where the file is no permutation of this number of indices.
 pub(crate) fn recorded(folder: &Path, count: usize) -> Result<Option<Vec<u32>>> {
     let path = &folder.join(GPU_ORDER);
     // Opening the file reports a name that cannot be looked up.

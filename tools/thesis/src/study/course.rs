@@ -147,7 +147,7 @@ impl Steps {
     }
 }
 
-/// What solves the steps of a side.
+/// The solver of a side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Solver {
     /// The board at this place.

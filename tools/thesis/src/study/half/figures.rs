@@ -35,7 +35,7 @@ fn recorded(build: &str) -> String {
     format!("{} %, {:.2} %", HALF_AGAINST_FLOAT.mean_percent[0], share * 100.0)
 }
 
-/// All sides, of which float is the first, for the figures.
+/// All sides for the figures; float is the first.
 pub(super) struct Shown<'a> {
     pub(super) subject: String,
     pub(super) sides: &'a [Side],

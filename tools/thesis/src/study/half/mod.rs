@@ -56,7 +56,7 @@ pub(crate) struct Options {
     pub(crate) builds: Vec<SixteenBits>,
 }
 
-/// Numbers to step beside float: those of a board, or half's with the words of the thesis.
+/// Numbers to step beside float: of a board, or of half with the words of the thesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SixteenBits {
     /// A board of this build.
