@@ -249,8 +249,10 @@ class Solver:
         impulses = self.tangential[index]
         for k, t in enumerate(tangents(q)):
             row = Row(t, c - pA, c - pB, a, b)
+            if row.J.is_zero():
+                continue
             if warm:
-                u = ZERO if row.J.is_zero() else Number(collision.friction_impulses[k])
+                u = Number(collision.friction_impulses[k])
                 impulse = u
             else:
                 u = smaller(larger(impulses[k] + row.e * row.J, -limit), limit)

@@ -13,7 +13,7 @@ from cocotbext.axi import AxiStreamBus, AxiStreamFrame, AxiStreamSink, AxiStream
 import records
 import specification as spec
 from bench import Bench
-from scenes import golden, random_step
+from scenes import golden, random_collision, random_step
 from solver import as_bits, plan, same_results, solve
 
 SEED = int(os.environ.get("PGS_SEED", "1"))
@@ -209,6 +209,29 @@ async def random_steps_equal_the_solver_bit_by_bit_and_cycle_by_cycle(dut):
         await board.run(step, table, context, exact_stalls=not paused)
         print(f"{context}: {len(step.bodies)} bodies, {len(step.collisions)} collisions, flags {step.flags:07b}, "
               f"{cycles_of(step)} cycles: 0 differ", flush=True)
+
+
+@cocotb.test(skip=not FULL)
+async def a_collision_whose_bodies_are_always_busy_issues_when_its_patience_ends(dut):
+    """Collision 2 needs both moving bodies, and each of the others one: without patience it would be the last."""
+    board = await Board.begin(dut)
+    source = random.Random(SEED)
+    while True:
+        step, table = random_step(source, (3, 15))
+        if [body.moves for body in step.bodies] == [False, True, True]:
+            break
+    for index in range(len(step.collisions)):
+        pair = (1, 2) if index == 2 else (0, 1 + index % 2)
+        collision = random_collision(source, step.bodies, pair)
+        while collision.count == 0:
+            collision = random_collision(source, step.bodies, pair)
+        step.collisions[index] = collision
+    step.arguments.update(contact_iterations=1, friction_iterations=1)
+    step.flags = spec.IMPULSES_OUT
+    order = plan(step)[0]
+    assert 2 < order.index(2) < len(order) - 1, order
+    await board.run(step, table, "patience", exact_stalls=True)
+    print(f"scene of patience, order {order}: 0 differ", flush=True)
 
 
 def short_step(source):
