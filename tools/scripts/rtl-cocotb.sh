@@ -101,7 +101,7 @@ for run in "${runs[@]}"; do
 	grep -a -E "^(scene|folder|faults)|\*\* (test_|TESTS=)" "$folder/log" || true
 	if [ ! -s "$folder/results.xml" ] || grep -q -E "<(failure|error)" "$folder/results.xml"; then
 		failed=yes
-		grep -a -B 2 -A 40 -E "(failed|Traceback|[Ee]rror)" "$folder/log" >&2 || tail -n 50 "$folder/log" >&2
+		grep -a -B 2 -A 40 -E "(failed|Traceback|error|Error)" "$folder/log" >&2 || tail -n 50 "$folder/log" >&2
 	fi
 done
 [ -z "$failed" ] || fail "a test failed; --seed $seed repeats it"
