@@ -11,6 +11,7 @@ module pgs_top (
   input  wire         aresetn,
 
   input  wire [11:0]  s_axi_awaddr,
+  input  wire [2:0]   s_axi_awprot,
   input  wire         s_axi_awvalid,
   output wire         s_axi_awready,
   input  wire [31:0]  s_axi_wdata,
@@ -21,6 +22,7 @@ module pgs_top (
   output wire         s_axi_bvalid,
   input  wire         s_axi_bready,
   input  wire [11:0]  s_axi_araddr,
+  input  wire [2:0]   s_axi_arprot,
   input  wire         s_axi_arvalid,
   output wire         s_axi_arready,
   output wire [31:0]  s_axi_rdata,
@@ -62,7 +64,7 @@ module pgs_top (
   assign m1_axis_tkeep = 16'hffff;
   assign m2_axis_tkeep = 16'hffff;
   assign m3_axis_tkeep = 16'hffff;
-  wire unused = &{1'b0, bodies[31:20], collisions[31:20],
+  wire unused = &{1'b0, s_axi_awprot, s_axi_arprot, bodies[31:20], collisions[31:20],
                   contact_iterations[31:8], friction_iterations[31:8], flags[31:7]};
 
   control_block control (

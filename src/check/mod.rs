@@ -3,7 +3,7 @@
 //! ```text
 //! bring-up: identification, interface version, capabilities, register regions, reset,
 //!           dma mode, length register                            stops at the first failure
-//! streams:  echo, sums, coherency, interrupt, fence              each by itself
+//! streams:  echo, sums, coherency, interrupt, issue queue, fence  each by itself
 //! ```
 //!
 //! An echo is a step without collisions and without integration: every bitstream returns poses and
@@ -14,6 +14,7 @@ mod bring_up;
 mod fence;
 mod judge;
 mod pattern;
+mod queue;
 mod report;
 mod streams;
 

@@ -87,11 +87,12 @@ pub(super) enum Line {
     Sums,
     Coherency,
     Interrupt,
+    Queue,
     Fence,
 }
 
 impl Line {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Identification,
         Self::Version,
         Self::Capabilities,
@@ -103,6 +104,7 @@ impl Line {
         Self::Sums,
         Self::Coherency,
         Self::Interrupt,
+        Self::Queue,
         Self::Fence,
     ];
 
@@ -119,6 +121,7 @@ impl Line {
             Self::Sums => "sums",
             Self::Coherency => "coherency",
             Self::Interrupt => "interrupt",
+            Self::Queue => "issue queue",
             Self::Fence => "fence",
         }
     }

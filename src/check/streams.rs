@@ -8,6 +8,7 @@ use super::bring_up::chain;
 use super::fence::fence;
 use super::judge::{Difference, Origin, Run, judge};
 use super::pattern::{Pattern, SHAPES};
+use super::queue::queue;
 use super::report::{Line, Lines, Outcome};
 use crate::axi_dma::{Direction, DmaError};
 use crate::beat::deal::sum_of_words;
@@ -44,9 +45,15 @@ pub(super) fn streams(mut accelerator: Accelerator, lines: &mut Lines) {
     };
     lines.set(Line::Sums, sums(&runs));
     let outcome = coherency(&mut accelerator).unwrap_or_else(|outcome| outcome);
+    let newest = matches!(outcome, Outcome::Ok { .. });
     lines.set(Line::Coherency, outcome);
     let outcome = interrupt(&mut accelerator).unwrap_or_else(|outcome| outcome);
     lines.set(Line::Interrupt, outcome);
+    let outcome = match newest {
+        true => queue(&mut accelerator),
+        false => Outcome::skipped("needs the line \"coherency\""),
+    };
+    lines.set(Line::Queue, outcome);
     let outcome = fence(&mut accelerator);
     lines.set(Line::Fence, outcome);
 }

@@ -35,7 +35,8 @@ pub struct Build {
     /// Threads of this machine for the board's arithmetic; no result depends on their number.
     /// [`OpenOptions::pack_threads`](crate::OpenOptions::pack_threads) has the driver's own.
     pub threads: Option<usize>,
-    /// Whether the board takes a step at once where its host waits for the whole of it; no result depends on it.
+    /// Whether the board takes a step at once where its host waits for the whole of it; no result
+    /// depends on it.
     pub fast: Option<bool>,
 }
 

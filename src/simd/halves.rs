@@ -49,8 +49,8 @@ mod aarch64 {
 
     #[inline(always)]
     pub(super) fn narrow(row: Beat) -> [u16; 4] {
-        // SAFETY: a beat and the vector have four words of 32 bits, sixteen bytes, and the vector may
-        // hold any bits.
+        // SAFETY: a beat and the vector have four words of 32 bits, sixteen bytes, and the vector
+        // may hold any bits.
         let wide = unsafe { std::mem::transmute::<Beat, float32x4_t>(row) };
         // SAFETY: every aarch64 that Linux runs on has the instruction.
         let narrow = unsafe { vcvt_f16_f32(wide) };

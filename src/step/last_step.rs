@@ -136,6 +136,8 @@ struct Kept {
     /// The normal impulses of its points, and the 0 of a new point.
     impulses: [f32; CONTACT_POINTS + 1],
     friction: [f32; 2],
+    /// The number of its points.
+    points: u32,
 }
 
 impl LastStep {
@@ -143,8 +145,10 @@ impl LastStep {
     /// places: one for each collision.
     ///
     /// Friction turns with the normal: it is as it was in the world, in the plane of the new
-    /// normal. Bodies A and B may have changed places, and the bodies may have other indices. Two
-    /// collisions that name one place both begin with its impulses.
+    /// normal. Bodies A and B may have changed places, and the bodies may have other indices. Each
+    /// point has an equal share of its collision's friction: a point that has gone takes its share
+    /// along, and where two collisions have points of one place, each begins with the shares of
+    /// its own.
     ///
     /// # Errors
     /// [`InputError::UnequalLengths`]: another number of places than of collisions.
@@ -189,12 +193,11 @@ impl LastStep {
         if found != expected {
             return Err(InputError::OtherImpulses { found, expected });
         }
-        let kept =
-            |(index, &Impulses { normal: [a, b, c, d], friction }): (usize, &Impulses)| Kept {
-                normal: collisions.collision(index).normal,
-                impulses: [a, b, c, d, 0.0],
-                friction,
-            };
+        let kept = |(index, &Impulses { normal: [a, b, c, d], friction }): (usize, &Impulses)| {
+            let collision = collisions.collision(index);
+            let (impulses, points) = ([a, b, c, d, 0.0], collision.points());
+            Kept { normal: collision.normal, impulses, friction, points }
+        };
         self.kept.clear();
         self.kept.extend(impulses.iter().enumerate().map(kept));
         Ok(())
@@ -244,12 +247,30 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
             return Impulses::ZERO;
         };
         let normal = points.map(|at| kept.impulses[usize::from(at).min(CONTACT_POINTS)]);
-        let new = self.collisions.collision(index).normal;
-        let friction = match new == kept.normal || kept.friction == [0.0; 2] {
+        let new = self.collisions.collision(index);
+        let friction = match new.normal == kept.normal || kept.friction == [0.0; 2] {
             true => kept.friction,
-            false => turned(kept.friction, kept.normal, new),
+            false => turned(kept.friction, kept.normal, new.normal),
         };
-        Impulses { normal, friction }.scaled(self.factor)
+        Impulses { normal, friction: kept.shares(friction, &new, *points) }.scaled(self.factor)
+    }
+}
+
+impl Kept {
+    /// The shares of the friction that the points of a collision have, at their places.
+    #[allow(clippy::cast_precision_loss, reason = "at most four points")]
+    fn shares(
+        &self,
+        friction: [f32; 2],
+        new: &Collision,
+        places: [u8; CONTACT_POINTS],
+    ) -> [f32; 2] {
+        let was = |(at, place): (u32, u8)| (at < new.points()) & (u32::from(place) < self.points);
+        let stayed: u32 = (0..).zip(places).map(|point| u32::from(was(point))).sum();
+        match stayed == self.points {
+            true => friction,
+            false => friction.map(|impulse| impulse * (stayed as f32 / self.points as f32)),
+        }
     }
 }
 

@@ -110,7 +110,8 @@ pub struct StepReport {
     pub bytes_to_device: u64,
     /// Bytes streamed back.
     pub bytes_from_device: u64,
-    /// Collisions that met a hazard, over all passes.
+    /// Collisions that met a hazard, over all passes. In an issue queue the oldest one alone meets
+    /// one: others pass it.
     pub hazards: u64,
     /// Sum of the accumulated normal impulses after the last contact pass, N s. `None` if the
     /// bitstream does not count it, or if the sum is [`IMPULSE_SUM_MAX`](Self::IMPULSE_SUM_MAX) or

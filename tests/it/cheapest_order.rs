@@ -155,7 +155,7 @@ fn a_small_scene_costs_no_more_than_the_better_order() {
 fn a_pile_is_reordered_and_costs_a_fraction() {
     fn pile() -> (Vec<Body>, Vec<Collision>) {
         let grid = "12x12x12".parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a small scene");
         let collisions = scene.detect().to_vec();
         (scene.bodies().to_vec(), collisions)

@@ -6,13 +6,14 @@ use bitstream_model::interface::fence::Fence;
 use bitstream_model::interface::number::{Numbers, Precision};
 use bitstream_model::interface::profile::{FLOAT, HALF, Inertia, PROFILES};
 use bitstream_model::{
-    BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Master, Quirks, Resettable,
+    Bandwidth, BoardConfig, Coherency, Direction, EmulatedBoard, InterruptWiring, Master, Quirks,
+    Resettable,
 };
 use zynq_pgs::check::Outcome;
 use zynq_pgs::error::OpenError;
 use zynq_pgs::{Accelerator, BoardChoice, CheckReport, Error, OpenOptions, check};
 
-const NAMES: [&str; 12] = [
+const NAMES: [&str; 13] = [
     "identification",
     "interface version",
     "capabilities",
@@ -24,6 +25,7 @@ const NAMES: [&str; 12] = [
     "sums",
     "coherency",
     "interrupt",
+    "issue queue",
     "fence",
 ];
 
@@ -52,14 +54,16 @@ fn detail<'a>(report: &'a CheckReport, name: &str) -> &'a str {
 /// Checks a board with these quirks. `name` alone fails: its `found`, `expected` and `next` texts
 /// contain the given ones. The lines behind it are skipped if `stops`.
 fn fails(quirks: Quirks, name: &str, stops: bool, [found, expected, next]: [&str; 3]) {
-    let (report, board) = checked(BoardConfig { quirks, ..fenced() });
+    // One that says a queue has none.
+    let queue = quirks.queue.map(|_| 0);
+    let (report, board) = checked(BoardConfig { quirks, queue, ..fenced() });
     assert!(!report.passed());
     let place = NAMES.iter().position(|line| *line == name).expect("a line of that name");
     for (index, line) in report.lines.iter().enumerate() {
         match &line.outcome {
             Outcome::Ok { .. } => assert!(index < place || index > place && !stops, "{line:?}"),
             Outcome::Skipped { reason } => {
-                assert!(index > place && stops, "{line:?}");
+                assert!(index > place && (stops || line.name == "issue queue"), "{line:?}");
                 assert_eq!(reason, &format!("needs the line \"{name}\""));
             }
             Outcome::Failed { found: seen, expected: wanted, next: advice } => {
@@ -296,6 +300,31 @@ fn an_interrupt_that_never_comes_or_always_stands_is_told_apart() {
     let quirks = Quirks { interrupt: InterruptWiring::StuckHigh, ..Quirks::default() };
     let texts = ["nothing asks for one", "quiet", "level, active high"];
     fails(quirks, "interrupt", false, texts);
+}
+
+#[test]
+fn a_queue_that_is_not_there_is_found_by_the_order_of_issue() {
+    let quirks = Quirks { queue: Some(64), ..Quirks::default() };
+    let found = "the bits of the order of the list, 4080 cycles of stalls";
+    let expected = "the third of three collisions ahead of the second, 2576 cycles of stalls";
+    fails(quirks, "issue queue", false, [found, expected, "past the queue"]);
+}
+
+#[test]
+fn the_queue_of_every_depth_passes_and_a_board_without_one_is_not_asked() {
+    for (depth, profile) in [(0, &FLOAT), (2, &FLOAT), (32, &FLOAT), (256, &FLOAT), (0, &HALF)] {
+        for bandwidth in [Bandwidth::Unlimited, Bandwidth::BytesPerSecond(1_000_000_000)] {
+            let config = BoardConfig { queue: Some(depth), profile, bandwidth, ..fenced() };
+            let (report, _) = checked(config);
+            assert!(report.passed(), "{report:#?}");
+            match depth {
+                0 => {
+                    assert_eq!(skipped(&report, "issue queue"), "the bitstream has no issue queue");
+                }
+                _ => assert!(detail(&report, "issue queue").ends_with(" 2576 cycles of stalls")),
+            }
+        }
+    }
 }
 
 #[test]

@@ -27,7 +27,7 @@ impl Pile {
     /// A pile with one more cube, which touches nothing and spins.
     fn new(grid: &str) -> Self {
         let grid = grid.parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a scene");
         let collisions = scene.detect().to_vec();
         let (shapes, mut bodies) = (scene.shapes().to_vec(), scene.bodies().to_vec());

@@ -52,7 +52,7 @@ impl Pile {
     /// lose the velocities where subnormals are flushed.
     fn new(inertia: Inertia) -> Self {
         let grid = "14x11x14".parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a scene");
         let off = |index: u32| {
             f32::from(u16::try_from(index * 7919 % 101).expect("below 101")) / 10_007.0

@@ -13,7 +13,7 @@ fn drop_a_pile() -> (Vec<StepReport>, Vec<Body>, Vec<usize>) {
         OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
     let mut accelerator = Accelerator::open(options).expect("the emulated board");
     let grid = "3x3x3".parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.5, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.5 };
     let mut scene = Scene::new(&options).expect("a small scene");
     accelerator.set_shapes(scene.shapes()).expect("they fit");
 
@@ -82,7 +82,7 @@ fn the_unsupported_rim_of_a_pile_topples_and_nothing_gains_energy() {
         OpenOptions { board: BoardChoice::Emulated(board.cpu_port()), ..OpenOptions::default() };
     let mut accelerator = Accelerator::open(options).expect("the emulated board");
     let grid = "4x4x4".parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a small scene");
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let start = scene.bodies().to_vec();

@@ -31,7 +31,7 @@ fn verified(order: Order) -> StepParameters {
 
 fn pile(text: &str, drop: f32) -> Scene {
     let grid = text.parse().expect("a grid");
-    Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).expect("a small scene")
+    Scene::new(&SceneOptions { grid, drop }).expect("a small scene")
 }
 
 /// Steps a scene on a board. Returns the state at the end, and every report.

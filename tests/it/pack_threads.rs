@@ -27,7 +27,7 @@ struct Pile {
 impl Pile {
     fn standing() -> Self {
         let grid = "20x16x20".parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a scene");
         let collisions = scene.detect().to_vec();
         let (shapes, mut bodies) = (scene.shapes().to_vec(), scene.bodies().to_vec());

@@ -51,22 +51,26 @@ fn found(last: &LastStep, collisions: &[Collision], places: &[Place]) -> Vec<Imp
 
 #[test]
 fn new_vanished_and_reordered_collisions_and_points_have_their_own_impulses() {
-    let (_, old) = scene(5);
+    let (_, mut old) = scene(5);
+    old.iter_mut().for_each(|collision| collision.count = 4);
     let last = last(&old[..4]);
-    // Number 1 has vanished; two of the points of 2 have, and one is new.
-    let new = [old[3], old[9], old[0], old[2]];
-    let moved = Place { collision: 2, points: [3, 255, 0, 255] };
-    let places = [Place::same(3), Place::NEW, Place::same(0), moved];
+    // Number 1 has vanished; the points of 2 are those of two collisions, one of which has a new
+    // one and one that does not count.
+    let new = [old[3], old[9], old[0], old[2], Collision { count: 3, ..old[2] }];
+    let [moved, rest] = [[3, 255, 0, 255], [255, 1, 255, 2]];
+    let [moved, rest] = [moved, rest].map(|points| Place { collision: 2, points });
+    let places = [Place::same(3), Place::NEW, Place::same(0), moved, rest];
     let of = |normal: [f32; 4], at: f32| Impulses { normal, friction: [at, -1.0] }.scaled(0.5);
     let expected = [
         of([4.0, 4.25, 4.5, 4.75], 3.0),
         Impulses::ZERO,
         of([1.0, 1.25, 1.5, 1.75], 0.0),
-        of([3.75, 0.0, 3.0, 0.0], 2.0),
+        Impulses { normal: [1.875, 0.0, 1.5, 0.0], friction: [0.5, -0.25] },
+        Impulses { normal: [0.0, 1.625, 0.0, 1.75], friction: [0.25, -0.125] },
     ];
     assert_eq!(found(&last, &new, &places), expected);
     let nothing = LastStep::default();
-    assert_eq!(found(&nothing, &new, &[Place::NEW; 4]), [Impulses::ZERO; 4]);
+    assert_eq!(found(&nothing, &new, &[Place::NEW; 5]), [Impulses::ZERO; 5]);
 }
 
 #[test]

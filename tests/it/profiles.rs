@@ -26,7 +26,7 @@ fn step(config: BoardConfig) -> Stepped {
     let (board, mut accelerator) = open(config);
     assert_eq!(accelerator.capabilities().variant, config.variant());
     let grid = "3x3x3".parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a small scene");
     // Off the grid, so that coordinates have more digits than sixteen bits hold.
     for (index, body) in (0_u32..).zip(scene.bodies_mut()).skip(1) {

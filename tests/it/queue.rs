@@ -67,7 +67,7 @@ struct Pile {
 impl Pile {
     fn new(grid: &str) -> Self {
         let grid = grid.parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a small scene");
         let collisions = scene.detect().to_vec();
         let (mut bodies, shapes) = (scene.bodies().to_vec(), scene.shapes().to_vec());

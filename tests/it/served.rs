@@ -176,7 +176,8 @@ fn a_served_board_gives_the_bits_and_the_cycles_of_one_in_this_process() {
         assert_eq!(found, expected, "{}", profile.name);
         for (here, there) in reports.iter().zip(&served_reports) {
             assert_eq!(counted(there), counted(here), "{}", profile.name);
-            // The board in this process takes the step at once: waits within a slice of each segment.
+            // The board in this process takes the step at once: waits within a slice of each
+            // segment.
             let apart = there.cycles.waits.abs_diff(here.cycles.waits);
             assert!(apart <= 64 * SEGMENTS, "{}: {apart}", profile.name);
         }

@@ -12,7 +12,7 @@ use zynq_pgs::{Bodies, Collisions, Shape, StepParameters, Velocity};
 fn separate_arrays_give_the_bits_of_arrays_of_structures() {
     let (_board, mut accelerator) = common::open(BoardConfig::default());
     let grid = "3x2x3".parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a small scene");
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     scene.detect();

@@ -19,7 +19,7 @@ const PASSES: u64 = 8;
 fn steps(config: BoardConfig) -> (Vec<StepReport>, Vec<u32>) {
     let (board, mut accelerator) = open(config);
     let grid = "10x10x10".parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a small scene");
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let mut reports = Vec::new();

@@ -5,7 +5,8 @@ usage: a53_step.py PGS PLUGIN [--quick] [FOLDER]
 
 PGS is the aarch64 build, PLUGIN is a53/plugin.c as a library. A step of a scene is the difference of two runs of
 `pgs run`; the second has one step more. FOLDER is a step in arrays, solved once, cold. --quick leaves all scenes but
-the smallest out, and holds what the driver takes against its budget.
+the smallest out. What the driver takes is held against its budget, and what `pgs` prints of it on paper
+(tools/pgs/src/a53.rs) against the count.
 """
 import json
 import re
@@ -25,12 +26,15 @@ PARTS = {
     "points": ["9last_step5Place7nearest"],
     "order": ["8zynq_pgs5order", "8zynq_pgs4step8ordering"],
     "bodies": ["8zynq_pgs4beat6bodies", "8zynq_pgs6record4body"],
-    "results": ["8zynq_pgs4beat7results", "8zynq_pgs4step7results", "8zynq_pgs4step8impulses", "8LastStep6commit"],
+    "results": ["8zynq_pgs4beat7results", "8zynq_pgs4step7results"],
+    "commit": ["8zynq_pgs4step8impulses", "8LastStep6commit"],
     "pack": ["8zynq_pgs4beat", "8zynq_pgs6record", "8zynq_pgs5scene", "9last_step"],
     "driver": ["8zynq_pgs4step", "8zynq_pgs5board", "8zynq_pgs8axi_dma", "8zynq_pgs13control_block"],
     "lanes": ["15bitstream_model4fast", "11pgs_support"],
 }
-HOST = ("points", "order", "pack", "bodies", "results", "driver")
+HOST = ("points", "order", "pack", "bodies", "results", "commit", "driver")
+# Parts that are told of a body; the others are told of a collision.
+OF_BODIES = ("bodies", "results")
 # Aarch64 instructions a collision that a step may take at most; packing has the beats of the bodies in it.
 BUDGET = {"order": 5, "cold": 155, "warm": 430}
 
@@ -56,6 +60,7 @@ class Step:
     def __init__(self, title, work, step):
         self.title, self.work = title, work
         self.bodies, self.collisions, self.board = step["bodies"], step["collisions"], step["modelled_ms"]
+        self.paper = step["host_on_a53_ms"]
 
     def milliseconds(self, groups, cores):
         """Shared evenly by the cores; packing takes at least as long as copying its bytes."""
@@ -65,6 +70,19 @@ class Step:
 
     def instructions(self, *groups):
         return sum(self.work[name][0] for name in groups) / self.collisions
+
+    def nanoseconds(self, group):
+        """On one core, a collision or a body."""
+        return self.work[group][1] / CLOCKS * 1e6 / (self.bodies if group in OF_BODIES else self.collisions)
+
+    def compare(self):
+        """Fails where a part that `pgs` prints on paper is off by a tenth, and by a hundredth of the whole."""
+        whole = sum(self.work[name][1] for name in HOST) / 4 / CLOCKS
+        for name in ("detection", *HOST):
+            counted, paper = self.work[name][1] / 4 / CLOCKS, self.paper[name]
+            if abs(counted - paper) > max(counted / 10, whole / 100):
+                sys.exit(f"error: {self.title}: {name} takes {counted:.3f} ms on four cores by the count, {paper:.3f} ms "
+                         "by tools/pgs/src/a53.rs: take the figure of the last table")
 
 
 def scene_step(pgs, plugin, title, arguments, steps):
@@ -76,12 +94,13 @@ def scene_step(pgs, plugin, title, arguments, steps):
 
 
 def show(steps):
-    """Prints both tables."""
+    """Prints all tables."""
     print("| aarch64 instructions a collision | points by the nearest | order | check and pack | bodies | results | other"
           " | detection |")
     print("|---|---|---|---|---|---|---|---|")
     for step in steps:
-        cells = [step.instructions(name) for name in (*HOST, "detection")]
+        columns = ["points"], ["order"], ["pack"], ["bodies"], ["results", "commit"], ["driver"], ["detection"]
+        cells = [step.instructions(*names) for names in columns]
         print(f"| {step.title} | " + " | ".join(f"{cell:,.1f}" for cell in cells) + " |")
     print()
     print("| ms on paper | driver, 1 core | 2 | 4 | board | board + driver, 4 cores | overlapped | solver in lanes, 4 cores"
@@ -94,6 +113,12 @@ def show(steps):
         cells = [*host, step.board, serial, overlapped, lanes, lanes / serial, lanes / overlapped, search]
         cells += [serial * WATTS, lanes * WATTS]
         print(f"| {step.title} | " + " | ".join(f"{cell:,.2f}" for cell in cells) + " |")
+    print()
+    parts = ("detection", *HOST)
+    print("| ns on one core | " + " | ".join(f"{name}, a {'body' if name in OF_BODIES else 'collision'}" for name in parts) + " |")
+    print("|---|" + "---|" * len(parts))
+    for step in steps:
+        print(f"| {step.title} | " + " | ".join(f"{step.nanoseconds(name):,.1f}" for name in parts) + " |")
 
 
 def hold(title, found, limit):
@@ -124,6 +149,8 @@ def main():
     show(steps)
     print()
     for step in steps:
+        if "10 + 10" not in step.title:
+            step.compare()
         if step.title.startswith("10x10x10, 4"):
             kind = "warm" if "warm" in step.title else "cold"
             hold(f"order, {kind}", step.instructions("order"), BUDGET["order"])

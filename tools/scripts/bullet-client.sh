@@ -45,8 +45,8 @@ attend "$client" "${scenes[@]}" > "$table" || code=$?
 cat "$table"
 echo "bullet-client: the scenes took $SECONDS s"
 [ $code = 0 ] || exit $code
-# The limits hold, too, where the board gets the places of the impulses. A single tower is chaotic.
-attend "$client" --by-place pile ratio || code=$?
+# The limits hold, too, where the board gets the places of the impulses.
+attend "$client" --by-place pile tower ratio || code=$?
 [ $code = 0 ] || exit $code
 
 if [ $# = 1 ]; then

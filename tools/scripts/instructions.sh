@@ -96,7 +96,7 @@ while read -r profile thing limit; do
 	# In one stretch and in two: the difference is that of the runs of a stretch alone.
 	counted=()
 	for runs in 1 2; do
-		count "$what" "${packers[@]/#/--toggle-collect=}" "$pack" --bench "${scene[@]}" --order hazard-free \
+		count "$what" "${packers[@]/#/--toggle-collect=}" "$pack" --bench "${scene[@]}" \
 			--profile "$profile" --thing "$thing" --runs $runs
 		counted+=("$(said 'Collected : NUMBER')")
 	done

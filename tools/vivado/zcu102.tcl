@@ -27,6 +27,8 @@ proc zcu102::usage {} {
   -jobs NUMBER          processes that Vivado may use (4)
   -clock-khz KHZ        clock of the logic; by default the one that CLOCK_KHZ of the design reports
   -until STEP           stop after "design", "synthesis" or "route" ("bitstream": go on to the end)
+  -strategy NAME        of the implementation (Performance_ExplorePostRoutePhysOpt); for a design that misses its
+                        timing also Performance_NetDelay_high, Performance_ExtraTimingOpt, Congestion_SpreadLogic_high
   -negative-slack WHAT  "refuse" to write a bitstream that misses its timing, or "allow" it (refuse)
   -help                 this text}
 }
@@ -34,7 +36,7 @@ proc zcu102::usage {} {
 # The values of the options.
 proc zcu102::options {arguments} {
 	set options [dict create -rtl rtl -out vivado-out -jobs 4 -clock-khz {} -until bitstream \
-		-negative-slack refuse]
+		-strategy Performance_ExplorePostRoutePhysOpt -negative-slack refuse]
 	foreach {name value} $arguments {
 		# Options with two dashes do as well.
 		regsub {^--} $name - name
@@ -256,7 +258,11 @@ proc zcu102::open_project_with {rtl out here} {
 	global pgs
 	create_project -force pgs [file join $out project] -part xczu9eg-ffvb1156-2-e
 	set boards [get_board_parts -quiet xilinx.com:zcu102:part0:*]
-	if {[llength $boards] == 0} { error "this Vivado has no board files of the ZCU102" }
+	if {[llength $boards] == 0} {
+		error "this Vivado has no board files of the ZCU102; newer ones install them apart:\
+			xhub::refresh_catalog \[xhub::get_xstores xilinx_board_store\];\
+			xhub::install \[xhub::get_xitems *zcu102*\]"
+	}
 	set_property board_part [lindex [lsort -dictionary $boards] end] [current_project]
 	set list [open [file join $rtl pgs.f]]
 	set modules [split [string trim [read $list]] \n]
@@ -298,7 +304,7 @@ proc zcu102::report_route {out} {
 # Writes what bootgen reads, and says what to do with it.
 proc zcu102::write_bif {out} {
 	set file [open [file join $out zynq-pgs.bif] w]
-	puts $file "all: { zynq-pgs.bit }"
+	puts $file "all: { \[destination_device = pl\] zynq-pgs.bit }"
 	close $file
 	puts "next: cd $out && bootgen -image zynq-pgs.bif -arch zynqmp -process_bitstream bin -w"
 	puts "which makes zynq-pgs.bit.bin; docs/bitstream.md goes on from there"
@@ -337,7 +343,7 @@ proc zcu102::main {arguments here} {
 	close_design
 	if {$until eq "synthesis"} { return }
 
-	set_property strategy Performance_ExplorePostRoutePhysOpt [get_runs impl_1]
+	set_property strategy [dict get $options -strategy] [get_runs impl_1]
 	run_to_end impl_1 -jobs $jobs
 	report_route $out
 	set setup [get_property STATS.WNS [get_runs impl_1]]

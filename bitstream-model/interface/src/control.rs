@@ -362,8 +362,8 @@ pub const CYCLES_HI: Register = read_only("CYCLES_HI", 0x18C, &[]);
 pub const WORK_CYCLES: Register = read_only("WORK_CYCLES", 0x190, &[]);
 /// Cycles of the last step in which the accelerator waited for a stream; stops at [`COUNTER_MAX`].
 pub const WAIT_CYCLES: Register = read_only("WAIT_CYCLES", 0x194, &[]);
-/// Collisions that met a hazard, over all passes: they waited (interlocked) or read a stale
-/// velocity (unchecked). It stops at [`COUNTER_MAX`].
+/// Collisions that met a hazard, over all passes: they waited (interlocked; in an issue queue as
+/// the oldest one) or read a stale velocity (unchecked). It stops at [`COUNTER_MAX`].
 pub const HAZARDS: Register = read_only("HAZARDS", 0x198, &[]);
 /// Sum modulo 2^32 of all 32-bit words received in the last step.
 pub const SUM_RECEIVED: Register = read_only("SUM_RECEIVED", 0x19C, &[]);

@@ -1,12 +1,15 @@
-// Block RAM with two ports that read or write a word each in every cycle. It consists of lanes of
-// nine bits, as simple_dual_port.v does.
+// Block RAM with two ports that read or write a word each in every cycle.
 //
-// A read of an address that is written in the same cycle gives an undefined word (`no_rw_check` tells
-// Yosys).
+// A block of the device has 4,096 words of nine bits, or 8,192 of four, 16,384 of two, 32,768 of one. So the bits
+// of a word, as far as they make whole nines, lie in tiles of 4,096 words, and the rest in the deepest tiles that
+// hold it. With 131,072 words of 64 bits that takes 228 blocks, in tiles of 4,096 words alone 256.
+//
+// A read of an address that is written in the same cycle gives an undefined word.
 // Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
-// ADDRESS_STAGES, so that accesses take effect in the order in which they are made.
+// ADDRESS_STAGES, so that accesses take effect in the order in which they are made. The first of the output
+// stages, of which there is at least one, lies in the blocks; the choice between the tiles follows it.
 `default_nettype none
 
 module true_dual_port #(
@@ -14,7 +17,7 @@ module true_dual_port #(
   parameter DEPTH          = 1024,
   parameter ADDRESS        = 10,
   parameter ADDRESS_STAGES = 0,
-  parameter OUTPUT_STAGES  = 0
+  parameter OUTPUT_STAGES  = 1
 ) (
   input  wire               clk,
   input  wire               write_a,
@@ -27,10 +30,14 @@ module true_dual_port #(
   output wire [WIDTH-1:0]   out_b
 );
   localparam ACCESS = 1 + ADDRESS + WIDTH;
+  localparam NINES  = WIDTH - WIDTH % 9;
+  localparam REST   = WIDTH % 9;
+  localparam TILE   = (REST == 1) ? 15 : (REST == 2) ? 14 : (REST <= 4) ? 13 : 12;
 
   wire               write_a_late, write_b_late;
   wire [ADDRESS-1:0] address_a_late, address_b_late;
   wire [WIDTH-1:0]   in_a_late, in_b_late;
+  wire [WIDTH-1:0]   read_a, read_b;
 
   pipeline_register #(.WIDTH(ACCESS), .STAGES(ADDRESS_STAGES)) access_a (
     .clk(clk),
@@ -43,33 +50,27 @@ module true_dual_port #(
     .q({write_b_late, address_b_late, in_b_late})
   );
 
-  wire [WIDTH-1:0] read_a, read_b;
-  genvar i;
   generate
-    for (i = 0; i < WIDTH; i = i + 9) begin : g_lane
-      localparam BITS = (WIDTH - i < 9) ? WIDTH - i : 9;
-
-      (* ram_style = "block", ram_decomp = "area", no_rw_check *)
-      reg [BITS-1:0] words [0:DEPTH-1];
-      reg [BITS-1:0] read_lane_a, read_lane_b;
-
-      always @(posedge clk) begin
-        if (write_a_late) words[address_a_late] <= in_a_late[i +: BITS];
-        read_lane_a <= words[address_a_late];
-      end
-      always @(posedge clk) begin
-        if (write_b_late) words[address_b_late] <= in_b_late[i +: BITS];
-        read_lane_b <= words[address_b_late];
-      end
-      assign read_a[i +: BITS] = read_lane_a;
-      assign read_b[i +: BITS] = read_lane_b;
+    if (NINES != 0) begin : g_nines
+      ram_lane #(.WIDTH(NINES), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(12)) lane (
+        .clk(clk),
+        .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[NINES-1:0]), .out_a(read_a[NINES-1:0]),
+        .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[NINES-1:0]), .out_b(read_b[NINES-1:0])
+      );
+    end
+    if (REST != 0) begin : g_rest
+      ram_lane #(.WIDTH(REST), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(TILE)) lane (
+        .clk(clk),
+        .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[WIDTH-1:NINES]), .out_a(read_a[WIDTH-1:NINES]),
+        .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[WIDTH-1:NINES]), .out_b(read_b[WIDTH-1:NINES])
+      );
     end
   endgenerate
 
-  pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES)) output_a (
+  pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES - 1)) output_a (
     .clk(clk), .d(read_a), .q(out_a)
   );
-  pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES)) output_b (
+  pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES - 1)) output_b (
     .clk(clk), .d(read_b), .q(out_b)
   );
 endmodule

@@ -60,20 +60,22 @@ module impulses #(
                    : friction ? friction_impulses : contact_impulses[95:32];
   end
 
-  // A pass writes both words of a memory or none.
-  simple_dual_port #(
+  // A pass writes both words of a memory or none. Port A writes, port B reads.
+  wire [63:0] unused_outer, unused_inner;
+  wire        unused = &{1'b0, unused_outer, unused_inner};
+  true_dual_port #(
     .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
   ) outer_words (
-    .clk(clk), .write(write_outer), .write_address(write_address), .in(outer_in),
-    .read_address(next_read), .out(outer)
+    .clk(clk), .write_a(write_outer), .address_a(write_address), .in_a(outer_in), .out_a(unused_outer),
+    .write_b(1'b0), .address_b(next_read), .in_b(64'd0), .out_b(outer)
   );
-  simple_dual_port #(
+  true_dual_port #(
     .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
   ) inner_words (
-    .clk(clk), .write(write_inner), .write_address(write_address), .in(inner_in),
-    .read_address(next_read), .out(inner)
+    .clk(clk), .write_a(write_inner), .address_a(write_address), .in_a(inner_in), .out_a(unused_inner),
+    .write_b(1'b0), .address_b(next_read), .in_b(64'd0), .out_b(inner)
   );
 
   wire all_are_zero  = first_of_kind & ~warm;

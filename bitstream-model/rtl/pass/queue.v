@@ -155,10 +155,10 @@ module queue #(
   wire [SLOTS-1:0] place_s3 = comes_s3 ? ONE << slot_s3 : {SLOTS{1'b0}};
   wire [SLOTS-1:0] place_s5 = comes_s5 ? ONE << slot_s5 : {SLOTS{1'b0}};
   wire [SLOTS-1:0] enter    = enters ? ONE << entry : {SLOTS{1'b0}};
-  reg  [SLOTS-1:0] entered, free, pick, oldest, common, held;
+  reg  [SLOTS-1:0] entered, free, pick, oldest, common;
   wire [SLOTS-1:0] entered_next = (entered & ~pick) | enter;
   wire [SLOTS-1:0] in_conflict;      // with the collision that comes
-  wire [SLOTS-1:0] older_met, conflict_met, timed, over;
+  wire [SLOTS-1:0] older_met, conflict_met, over;
 
   // Among the asked: the ones that no other is older than.
   wire [SLOTS-1:0] asked      = phase ? free : entered & ~pick;
@@ -200,7 +200,6 @@ module queue #(
       entered <= entered_next;
       free    <= entered_next & over & ~(common & {SLOTS{blocks}});
     end
-    held <= ~place_s5 & (held | (timed & entered & {SLOTS{decides}}));
   end
 
   genvar i;
@@ -213,7 +212,6 @@ module queue #(
       wire [7:0]     slots = place_s5[i] ? slots_s5 : timer;
       assign in_conflict[i] = (moves_a_s3 & ((a_is_a & moves_a) | (a_is_b & moves_b)))
                             | (moves_b_s3 & ((b_is_a & moves_a) | (b_is_b & moves_b)));
-      assign timed[i] = timer != 8'd0;
       assign over[i]  = ~conflict_met[i] & ((slots == 8'd0) | ((slots == 8'd1) & passes_slot));
       always @(posedge clk) begin
         if (place_s1[i]) {a, b} <= {a_s1, b_s1};
@@ -226,13 +224,15 @@ module queue #(
     end
   endgenerate
 
-  // ---- Collisions that met a hazard
+  // ---- Collisions that met a hazard: the oldest one that does not go at once
 
-  reg         meets_hazard, full;
+  reg         held_before, meets_hazard, full;
   reg  [31:0] met;
   assign hazards = met | {32{full}};
   always @(posedge clk) begin
-    meets_hazard <= issues & |(pick & held) & ~clear;
+    if (~passing | oldest_goes) held_before <= 1'b0;
+    else if (decides) held_before <= 1'b1;
+    meets_hazard <= oldest_goes & held_before & ~clear;
     if (clear) {full, met} <= 33'd0;
     else {full, met} <= {full, 32'd0} | ({1'b0, met} + {32'd0, meets_hazard});
   end

@@ -346,7 +346,7 @@ impl Registers {
             _ if offset == DMA.offset => dma::ADDRESS_WIDTH
                 .put(dma::LENGTH_WIDTH.put(0, config.length_width), config.address_width),
             _ if offset == NUMBERS.offset => formats(&variant.numbers),
-            _ if offset == QUEUE.offset => config.queue_depth(),
+            _ if offset == QUEUE.offset => config.quirks.queue.unwrap_or(config.queue_depth()),
             _ if offset == FENCE_BASE.offset => Fence::to_registers(config.fence)[0],
             _ if offset == FENCE_SIZE.offset => Fence::to_registers(config.fence)[1],
             _ if offset == ERROR.offset => self.error,

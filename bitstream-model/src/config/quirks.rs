@@ -72,6 +72,8 @@ pub struct Quirks {
     pub identification: u32,
     /// Value of VERSION: another one means a bitstream of another interface version.
     pub version: u32,
+    /// Value of QUEUE, whatever queue the design has.
+    pub queue: Option<u32>,
     /// True width of the cores' length registers, if the control block's DMA register gives another
     /// one. The default of an AXI DMA is 14 bits.
     pub length_register: Option<u32>,
@@ -94,6 +96,7 @@ impl Default for Quirks {
         Self {
             identification: IDENTIFICATION.reset,
             version: VERSION.reset,
+            queue: None,
             length_register: None,
             interrupt: InterruptWiring::default(),
             coherency: Coherency::default(),

@@ -3,8 +3,8 @@
 //!
 //! The caller waits only for threads that have begun: a late one finds nothing to do.
 //!
-//! All work is done in the [standard floating-point environment](float_env), on every thread: what is
-//! computed depends neither on the thread that computes it nor on who started that.
+//! All work is done in the [standard floating-point environment](float_env), on every thread: what
+//! is computed depends neither on the thread that computes it nor on who started that.
 //!
 //! ```
 //! let mut crew = pgs_support::Crew::new("sums", 1);
@@ -45,7 +45,8 @@ pub use process::Process;
 #[cfg(any(test, feature = "forked-child"))]
 pub use process::in_forked_child;
 
-/// The work of every thread that comes in time; the argument is the thread's number, the caller's 0.
+/// The work of every thread that comes in time; the argument is the thread's number, the caller's
+/// 0.
 type Work = dyn Fn(usize) + Sync;
 
 #[derive(Default)]
@@ -162,8 +163,8 @@ impl Crew {
         self.refused.as_ref()
     }
 
-    /// Calls `work` for each share, on the first thread that is free, and returns when all shares are
-    /// done. A single share wakes no helper.
+    /// Calls `work` for each share, on the first thread that is free, and returns when all shares
+    /// are done. A single share wakes no helper.
     ///
     /// # Panics
     ///

@@ -2,8 +2,9 @@
 
 /// The process that made a value.
 ///
-/// A forked child has a copy of the value, but no thread of the parent's, and it shares files, locks and
-/// sockets with its parent. Code that reaches outside of its own memory must not act there.
+/// A forked child has a copy of the value, but no thread of the parent's, and it shares files,
+/// locks and sockets with its parent. Code that reaches outside of its own memory must not act
+/// there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Process(u32);
 
@@ -20,7 +21,8 @@ impl Process {
         Self(std::process::id())
     }
 
-    /// Whether it is the process that calls. This asks the kernel (`getpid`), well below a microsecond.
+    /// Whether it is the process that calls. This asks the kernel (`getpid`), well below a
+    /// microsecond.
     #[must_use]
     pub fn is_this(self) -> bool {
         self == Self::this()
@@ -33,8 +35,8 @@ impl Process {
     }
 }
 
-/// For tests: does some work in a forked child. Returns the number that it gives, or `None` if the child
-/// was killed; 60 s later it is.
+/// For tests: does some work in a forked child. Returns the number that it gives, or `None` if the
+/// child was killed; 60 s later it is.
 ///
 /// # Panics
 ///

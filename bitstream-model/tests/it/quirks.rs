@@ -6,7 +6,7 @@ use crate::common::{BOTH, CORES, Host};
 use bitstream_model::{BoardConfig, InterruptWiring, Quirks, Resettable};
 use pgs_interface::axi_dma::{DMACR, LENGTH, dmacr};
 use pgs_interface::control::{
-    AP_CTRL, CLOCK_KHZ, DMA, GIE, IDENTIFICATION, IER, ISR, RESET, VERSION,
+    AP_CTRL, CLOCK_KHZ, DMA, GIE, IDENTIFICATION, IER, ISR, QUEUE, RESET, VERSION,
 };
 
 fn built_with(quirks: Quirks) -> Host {
@@ -14,14 +14,16 @@ fn built_with(quirks: Quirks) -> Host {
 }
 
 #[test]
-fn identification_and_version_read_the_configured_values() {
+fn identification_version_and_queue_read_the_configured_values() {
     let host = built_with(Quirks {
         identification: 0x1234_5678,
         version: 0x0002_0003,
+        queue: Some(7),
         ..Quirks::default()
     });
     assert_eq!(host.control(IDENTIFICATION), 0x1234_5678);
     assert_eq!(host.control(VERSION), 0x0002_0003);
+    assert_eq!(host.control(QUEUE), 7);
     assert_eq!(host.control(CLOCK_KHZ), 275_000);
     host.assert_no_violation();
 }

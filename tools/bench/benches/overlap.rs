@@ -3,14 +3,12 @@
 //! ```sh
 //! cargo bench --bench overlap
 //! cargo bench --bench overlap -- --input tests/golden/pile5_step60 --pack-ms 0.01
-//! cargo bench --bench overlap -- --pack-ms 3.5 --unpack-ms 0.5 --order as-given
 //! ```
 //!
 //! The emulated board's clock advances with register accesses and waits; it stands still while this
 //! host computes, since a board has another host. So an option gives the time of packing there
 //! (`--pack-ms`, by default 7 ms for the thesis' step), and the scene lets this time pass on the
-//! board's clock while the driver reads it. Storing the results takes as long per byte, or
-//! `--unpack-ms`. The step is always the same, of a standing scene or of a folder. The steps run
+//! board's clock while the driver reads it. Storing the results takes as long per byte. The step is always the same, of a standing scene or of a folder. The steps run
 //! one after the other (serial), and each packed while the one before it is on the board
 //! (overlapped).
 
@@ -24,11 +22,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use bench::milliseconds;
-use bench::options::{Common, Pile, Sent};
+use bench::options::{Common, Pile};
 use bench::step::Step;
 use bitstream_model::{BoardConfig, CpuPort, EmulatedBoard};
 use clap::Parser;
 use scene::Grid;
+use zynq_pgs::order::Order;
 use zynq_pgs::{
     Accelerator, BoardChoice, Bodies, Body, Collision, Collisions, InFlight, OpenOptions, Pose,
     StepParameters, StepReport, Velocity,
@@ -44,15 +43,9 @@ struct Options {
     /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
-    /// Order in which the collisions are sent
-    #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
-    order: Sent,
     /// Time of packing a step on the board's processor, ms
     #[arg(long, value_name = "MS", default_value = "7", value_parser = time)]
     pack_ms: Duration,
-    /// Time of storing the results there, ms [default: as long per byte as packing]
-    #[arg(long, value_name = "MS", value_parser = time)]
-    unpack_ms: Option<Duration>,
     #[command(flatten)]
     common: Common,
 }
@@ -199,7 +192,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let board = BoardChoice::Emulated(emulated.cpu_port());
     let mut accelerator = Accelerator::open(OpenOptions { board, ..Default::default() })?;
     accelerator.set_shapes(&shapes)?;
-    parameters.order = Some(options.order.order());
+    parameters.order = Some(Order::HazardFree);
     let mut job = Job {
         bodies: &bodies,
         collisions: &collisions,
@@ -212,13 +205,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let (_, alone) = job.serial(&mut accelerator, 2)?;
     let on_board = alone.modelled_time();
     job.pack = options.pack_ms;
-    job.unpack = options.unpack_ms.unwrap_or_else(|| {
-        // The collisions are packed once, however often they are streamed.
-        let passes = u64::from(alone.passes).max(1);
-        let packed = alone.bytes_to_device.saturating_sub(alone.bytes_from_device) / passes
-            + alone.bytes_from_device;
-        options.pack_ms.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64)
-    });
+    // The collisions are packed once, however often they are streamed.
+    let passes = u64::from(alone.passes).max(1);
+    let packed = alone.bytes_to_device.saturating_sub(alone.bytes_from_device) / passes
+        + alone.bytes_from_device;
+    job.unpack = options.pack_ms.mul_f64(alone.bytes_from_device as f64 / packed.max(1) as f64);
     let (serial, _) = job.serial(&mut accelerator, steps)?;
     let each = job.overlapped(&mut accelerator, steps)?;
     let host = job.pack + job.unpack;
@@ -232,14 +223,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         steps
     );
     println!("pack      {:>8.3} ms  given", ms(job.pack));
-    println!(
-        "unpack    {:>8.3} ms  {}",
-        ms(job.unpack),
-        match options.unpack_ms {
-            Some(_) => "given",
-            None => "as packing, by bytes",
-        }
-    );
+    println!("unpack    {:>8.3} ms  as packing, by bytes", ms(job.unpack));
     println!("board     {:>8.3} ms  {} cycles", ms(on_board), alone.cycles.total);
     println!("serial    {:>8.3} ms  a step", ms(serial));
     println!("overlapped{:>8.3} ms  a step, {ratio:.3} of the longer of the two", ms(each));

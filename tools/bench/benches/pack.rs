@@ -4,21 +4,19 @@
 //! cargo bench --bench pack
 //! cargo bench --bench pack -- --input FOLDER --cpu-time
 //! cargo bench --bench pack -- --grid 10x10x10 --runs 31
-//! cargo bench --bench pack -- --profile half --thing in-order --order hazard-free
+//! cargo bench --bench pack -- --profile half --thing in-order
 //! cargo bench --bench pack -- --threads 2
 //! ```
 //!
 //! The step is one of the thesis' cubes, standing on the ground, or the one in a folder of arrays
-//! (`--input`; or else `full_step186` of the folder that the environment variable `PGS_VECTORS`
-//! names). One thread does everything, unless `--threads` asks for more. Each item is measured
+//! (`--input`). One thread does everything, unless `--threads` asks for more. Each item is measured
 //! alone: it and a `memcpy` from warm memory to warm memory run in turn. The first runs of a
 //! stretch fill the caches with the item's buffers and do not count. The output has the bytes
 //! written, medians, GB/s of these bytes, and the throughput relative to that of `memcpy`.
 //!
 //! - `bodies`: velocities and poses, and what collisions need of bodies
-//! - `as given`, `in order`: bodies, then collisions in array order and in an order without
-//!   hazards: the one that is the default on a bitstream that does not wait, or `--order`, in the
-//!   window of `float`
+//! - `as given`, `in order`: bodies, then collisions in array order and in the order without
+//!   hazards, in the window of `float`
 //! - `warm`: the same in order, with impulses to begin with
 //! - `unpack`: results with their checks, into the driver's own memory, where they are f32
 //! - `commit`: from there to the caller's bodies
@@ -38,7 +36,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use bench::options::{Common, Pile, Sent};
+use bench::options::{Common, Pile};
 use bench::step::Step;
 use bench::{Clock, Run, STRETCH, milliseconds, ratio, warm_medians};
 use bitstream_model::BoardConfig;
@@ -55,8 +53,8 @@ use zynq_pgs::{Collision, Impulses, InputError, StepParameters, WarmCollisions};
 #[command(name = "cargo bench --bench pack --")]
 struct Options {
     /// Cubes along each axis, standing; y is up
-    #[arg(long, value_name = "NXxNYxNZ", conflicts_with = "input")]
-    grid: Option<Grid>,
+    #[arg(long, value_name = "NXxNYxNZ", default_value_t, conflicts_with = "input")]
+    grid: Grid,
     /// Take the step from this folder of arrays instead of a pile
     #[arg(long, value_name = "DIR")]
     input: Option<PathBuf>,
@@ -74,9 +72,6 @@ struct Options {
     /// Measure this profile only: float or half
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
-    /// The order for `in order`, one without hazards
-    #[arg(long, value_enum, default_value_t = Sent::HazardFree)]
-    order: Sent,
     /// Measure this item only
     #[arg(long, value_enum)]
     thing: Option<Thing>,
@@ -101,14 +96,9 @@ impl Options {
     }
 
     fn step(&self) -> Result<Step, Box<dyn Error>> {
-        let vectors = bench::variable("PGS_VECTORS").filter(|_| self.grid.is_none());
-        let vectors = || vectors.map(|root| PathBuf::from(root).join("full_step186"));
-        match self.input.clone().or_else(vectors) {
-            Some(folder) => Step::load(&folder),
-            None => {
-                let pile = Pile::standing(self.grid.unwrap_or_default(), 1);
-                Step::of_pile(&pile, BoardConfig::default())
-            }
+        match &self.input {
+            Some(folder) => Step::load(folder),
+            None => Step::of_pile(&Pile::standing(self.grid, 1), BoardConfig::default()),
         }
     }
 
@@ -193,11 +183,10 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let chosen = options.profiles()?;
     let step = options.step()?;
-    let schedule = step.schedule(BoardConfig::default(), options.order.made()?)?;
-    let order = options.order.name();
+    let schedule = step.schedule(BoardConfig::default())?;
     let clock = if options.cpu_time { "the thread's time" } else { "time that passes" };
     println!(
-        "{}: {} bodies, {} collisions; in order is {order}, {} empty entries; medians of {} \
+        "{}: {} bodies, {} collisions; in order is hazard-free, {} empty entries; medians of {} \
          stretches of {STRETCH} runs in turn, {clock}; {} threads\n",
         step.name,
         step.bodies.len(),

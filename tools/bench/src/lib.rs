@@ -15,10 +15,9 @@ pub mod options;
 pub mod step;
 
 use std::error::Error;
-use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
 
@@ -31,26 +30,6 @@ pub fn exit_code(outcome: Result<(), Box<dyn Error>>) -> ExitCode {
     let Err(error) = outcome else { return ExitCode::SUCCESS };
     let _ = writeln!(io::stderr(), "error: {error}");
     ExitCode::from(2)
-}
-
-/// Reads a variable of the environment; a blank one counts as unset.
-#[must_use]
-pub fn variable(name: &str) -> Option<OsString> {
-    let blank = |text: &OsString| text.to_str().is_some_and(|text| text.trim().is_empty());
-    std::env::var_os(name).filter(|text| !blank(text))
-}
-
-/// Runs all in turn, `runs` times each; returns the median time of each.
-pub fn medians(runs: usize, contestants: &mut [Run<'_>]) -> Vec<Duration> {
-    let mut times = vec![Vec::with_capacity(runs); contestants.len()];
-    for _ in 0..runs {
-        for (run, times) in contestants.iter_mut().zip(&mut times) {
-            let begin = Instant::now();
-            run();
-            times.push(begin.elapsed());
-        }
-    }
-    times.into_iter().map(median).collect()
 }
 
 /// The clock of a measurement.
@@ -124,18 +103,6 @@ mod tests {
     use std::cell::RefCell;
 
     use super::*;
-
-    #[test]
-    fn contestants_take_turns() {
-        let order = RefCell::new(Vec::new());
-        let mut contestants: Vec<Run<'_>> = vec![
-            Box::new(|| order.borrow_mut().push('a')),
-            Box::new(|| order.borrow_mut().push('b')),
-        ];
-        assert_eq!(medians(2, &mut contestants).len(), 2);
-        drop(contestants);
-        assert_eq!(order.into_inner(), ['a', 'b', 'a', 'b']);
-    }
 
     #[test]
     fn each_has_a_stretch_to_itself() {

@@ -1,8 +1,7 @@
 //! Options that the benchmarks share.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scene::Grid;
-use zynq_pgs::order::Order;
 
 /// How to measure, and how to show the result.
 #[derive(Debug, Clone, Copy, Args)]
@@ -52,46 +51,5 @@ impl Pile {
     #[must_use]
     pub fn standing(grid: Grid, steps: u32) -> Self {
         Self { grid, drop: 0.0, steps }
-    }
-}
-
-/// The order in which collisions are packed or sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Sent {
-    /// As the step has them
-    AsGiven,
-    /// Far places of the step in turn, for an issue queue
-    Interleaved,
-    /// Without hazards, near the order of the step
-    HazardFree,
-}
-
-impl Sent {
-    /// The name on the command line.
-    #[must_use]
-    pub fn name(self) -> String {
-        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
-    }
-
-    /// The driver's order, if it is one that has to be made.
-    ///
-    /// # Errors
-    ///
-    /// Names the orders that are made if this is none.
-    pub fn made(self) -> Result<Order, String> {
-        match self {
-            Self::AsGiven => Err("--order is interleaved or hazard-free here".to_owned()),
-            Self::Interleaved | Self::HazardFree => Ok(self.order()),
-        }
-    }
-
-    /// The driver's order.
-    #[must_use]
-    pub const fn order(self) -> Order {
-        match self {
-            Self::AsGiven => Order::AsGiven,
-            Self::Interleaved => Order::Interleaved,
-            Self::HazardFree => Order::HazardFree,
-        }
     }
 }

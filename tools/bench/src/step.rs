@@ -56,7 +56,7 @@ impl Step {
     /// There is no such pile, or a step fails.
     pub fn of_pile(pile: &Pile, config: BoardConfig) -> Result<Self, Box<dyn Error>> {
         let Pile { grid, drop, steps } = *pile;
-        let mut scene = Scene::new(&SceneOptions { grid, drop, ..Default::default() })?;
+        let mut scene = Scene::new(&SceneOptions { grid, drop })?;
         let mut accelerator = open(config, scene.shapes())?;
         let parameters = StepParameters::default();
         let mut sent = parameters;
@@ -76,17 +76,17 @@ impl Step {
         })
     }
 
-    /// A schedule for a board of this build.
+    /// The order `hazard-free` for a board of this build.
     ///
     /// # Errors
     ///
     /// There is no such order.
-    pub fn schedule(&self, config: BoardConfig, order: Order) -> Result<Schedule, Box<dyn Error>> {
+    pub fn schedule(&self, config: BoardConfig) -> Result<Schedule, Box<dyn Error>> {
         let accelerator = open(config, &self.shapes)?;
         let window = IssueWindow::of(accelerator.capabilities())?;
         let mut buffers = InputBuffers::new();
         let input = buffers.gather(&self.bodies, &self.collisions, &self.shapes);
-        Ok(Orderer::new().order(&input, order, window)?.clone())
+        Ok(Orderer::new().order(&input, Order::HazardFree, window)?.clone())
     }
 
     /// The collisions in the order `hazard-free`, as a board of this build gets them.
@@ -95,7 +95,7 @@ impl Step {
     ///
     /// There is no such order.
     pub fn in_order(&self, config: BoardConfig) -> Result<Vec<Collision>, Box<dyn Error>> {
-        let schedule = self.schedule(config, Order::HazardFree)?;
+        let schedule = self.schedule(config)?;
         let entries = (0..schedule.len()).filter_map(|entry| schedule.get(entry));
         Ok(entries.map(|index| self.collisions[index]).collect())
     }

@@ -186,6 +186,9 @@ typedef struct zpgs_bodies {
 } zpgs_bodies;
 
 // Where a collision was in the last step of its world.
+//
+// The points of that collision had equal shares of its friction. One that is not named takes its
+// share along; two collisions that name points of one each begin with the shares of theirs.
 typedef struct zpgs_place {
     // Its index among the collisions of that step, or `ZPGS_NEW_COLLISION`.
     uint32_t collision;
@@ -211,7 +214,8 @@ typedef struct zpgs_collisions {
     // Where each collision was in the last step of its world that `zpgs_commit` has kept: a
     // dense array. Null without a warm start by place.
     const struct zpgs_place *places;
-    // The share of the impulses at the places that a step begins with, such as 0.85.
+    // The share of the impulses at the places that a step begins with, such as 0.85. A warm start
+    // with 0 is refused: it would be a cold one that takes longer.
     float factor;
     // The world: any number. Each one has a last step of its own.
     uint32_t world;
@@ -402,6 +406,14 @@ enum zpgs_status zpgs_read_impulses(struct zpgs_accelerator *accelerator,
 enum zpgs_status zpgs_commit(struct zpgs_accelerator *accelerator,
                              const struct zpgs_collisions *collisions);
 
+// Forgets the last step of a world that `zpgs_commit` has kept, and frees its memory: all
+// collisions of the next step are then new. A world of which nothing is kept is no error.
+// `zpgs_close` forgets every world.
+//
+// # Safety
+// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
+enum zpgs_status zpgs_forget(struct zpgs_accelerator *accelerator, uint32_t world);
+
 // Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 // board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
 // The step after it is not cancelled. Any thread may call it at any time, also during another
@@ -458,9 +470,10 @@ enum zpgs_status zpgs_begin(struct zpgs_accelerator *accelerator);
 // Appends `count` collisions to the list, all or none. The arrays are the caller's again when the
 // call returns.
 //
-// A collision of count 0 keeps its place. `impulses` has the impulses that a step with
+// A collision of count 0 keeps its index. `impulses` has the impulses that a step with
 // `warm_start` begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null
-// if no step of the list starts warm. `zpgs_end` checks the values of both.
+// if no step of the list starts warm. `zpgs_end` checks the values of both. A warm start by place
+// needs the arrays of `zpgs_collisions`, in `zpgs_step`, `zpgs_submit` or `zpgs_prepare`.
 //
 // # Safety
 // `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`

@@ -74,7 +74,8 @@ pub struct CollisionArray {
     /// Where each collision was in the last step of its world that `zpgs_commit` has kept: a
     /// dense array. Null without a warm start by place.
     pub places: *const Place,
-    /// The share of the impulses at the places that a step begins with, such as 0.85.
+    /// The share of the impulses at the places that a step begins with, such as 0.85. A warm start
+    /// with 0 is refused: it would be a cold one that takes longer.
     pub factor: f32,
     /// The world: any number. Each one has a last step of its own.
     pub world: u32,

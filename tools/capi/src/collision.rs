@@ -52,6 +52,9 @@ pub const ZPGS_NEW_COLLISION: u32 = u32::MAX;
 pub const ZPGS_NEW_POINT: u8 = u8::MAX;
 
 /// Where a collision was in the last step of its world.
+///
+/// The points of that collision had equal shares of its friction. One that is not named takes its
+/// share along; two collisions that name points of one each begin with the shares of theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub struct Place {

@@ -304,6 +304,23 @@ pub unsafe extern "C" fn zpgs_commit(
     })
 }
 
+/// Forgets the last step of a world that `zpgs_commit` has kept, and frees its memory: all
+/// collisions of the next step are then new. A world of which nothing is kept is no error.
+/// `zpgs_close` forgets every world.
+///
+/// # Safety
+/// `accelerator` is null or from `zpgs_open`, and not closed before the call returns.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn zpgs_forget(accelerator: *mut AcceleratorHandle, world: u32) -> Status {
+    // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
+    // returns: `# Safety` of this function.
+    let handle = unsafe { memory::handle(accelerator) };
+    call_with(handle, |state| {
+        state.forget(world);
+        Ok(())
+    })
+}
+
 /// Ends the step in flight or in work, or else the next one, within about ten milliseconds of the
 /// board's time: the call that waits for it returns `ZPGS_STATUS_CANCELLED`, and the bodies stay.
 /// The step after it is not cancelled. Any thread may call it at any time, also during another
@@ -335,7 +352,7 @@ pub(crate) fn outputs_apart(
     memory::refuse_overlap(&outputs, inputs.chain([bodies.input()]))
 }
 
-/// Refuses a warm start without impulses, which would be a cold one that takes longer.
+/// Refuses a warm start whose impulses are all 0, which would be a cold one that takes longer.
 fn check_impulses(
     collisions: &CollisionsView<'_>,
     parameters: &StepParameters,
@@ -344,6 +361,13 @@ fn check_impulses(
         return Err(Failure::argument(
             "a warm start without impulses: set impulses or places of zpgs_collisions, or leave \
              warm_start 0"
+                .to_owned(),
+        ));
+    }
+    if parameters.warm_start && collisions.places.is_some() && collisions.factor == 0.0 {
+        return Err(Failure::argument(
+            "a warm start by place with 0 as the factor of zpgs_collisions: give the share of the \
+             impulses, such as 0.85, or leave warm_start 0"
                 .to_owned(),
         ));
     }

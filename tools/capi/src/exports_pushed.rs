@@ -31,9 +31,10 @@ pub unsafe extern "C" fn zpgs_begin(accelerator: *mut AcceleratorHandle) -> Stat
 /// Appends `count` collisions to the list, all or none. The arrays are the caller's again when the
 /// call returns.
 ///
-/// A collision of count 0 keeps its place. `impulses` has the impulses that a step with
+/// A collision of count 0 keeps its index. `impulses` has the impulses that a step with
 /// `warm_start` begins with, one `zpgs_impulses` a collision, zeros for a new one. It may be null
-/// if no step of the list starts warm. `zpgs_end` checks the values of both.
+/// if no step of the list starts warm. `zpgs_end` checks the values of both. A warm start by place
+/// needs the arrays of `zpgs_collisions`, in `zpgs_step`, `zpgs_submit` or `zpgs_prepare`.
 ///
 /// # Safety
 /// `accelerator` is null or from `zpgs_open`, and not closed before the call returns. `collisions`

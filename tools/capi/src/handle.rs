@@ -147,6 +147,11 @@ impl State {
         Ok(last.commit(collisions, self.accelerator.impulses()).map_err(Error::from)?)
     }
 
+    /// Frees the last step of a world.
+    pub(crate) fn forget(&mut self, world: u32) {
+        self.last_steps.remove(&world);
+    }
+
     /// The list of collisions that are pushed.
     pub(crate) fn pushed(&mut self) -> &mut Pushed {
         &mut self.pushed
@@ -185,9 +190,8 @@ impl State {
         let ticket = self.ticket()?;
         self.prepared = None;
         let mut step = self.accelerator.attach(ticket)?;
-        let prepared = placed(&mut self.last_steps, collisions, |all| {
-            Ok(step.prepare(bodies, all, parameters)?)
-        });
+        let prepared =
+            placed(&self.last_steps, collisions, |all| Ok(step.prepare(bodies, all, parameters)?));
         // The step in flight goes on, whatever became of the other.
         self.ticket = Some(step.detach());
         self.prepared = Some(prepared?);
@@ -230,14 +234,15 @@ impl State {
 
 /// Hands the collisions over, with the impulses at their places in the last step of their world.
 fn placed<T>(
-    last_steps: &mut BTreeMap<u32, LastStep>,
+    last_steps: &BTreeMap<u32, LastStep>,
     given: &CollisionsView<'_>,
     take: impl FnOnce(&dyn Collisions) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     match given.places {
         None => take(given),
         Some(places) => {
-            let last = last_steps.entry(given.world).or_default();
+            let none = LastStep::default();
+            let last = last_steps.get(&given.world).unwrap_or(&none);
             take(&last.placed(given, places, given.factor).map_err(Error::from)?)
         }
     }

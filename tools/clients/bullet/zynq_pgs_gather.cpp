@@ -198,18 +198,19 @@ void ZynqPgsGather::addManifold(btPersistentManifold *manifold, const btContactS
     if (count == 0) return;
 
     // The nearest point of the first one follows it. So two points that share a collision lie at one edge of
-    // a face, and the friction of the two collisions acts at opposite edges.
+    // a face, and the friction of the two collisions acts at opposite edges. With places it is the one that
+    // shared the first one's collision in the last step, or the nearest new one.
     int order[MANIFOLD_CACHE_SIZE];
     for (int i = 0; i < count; i++) order[i] = i;
+    std::stable_partition(order, order + count,
+                          [&](int i) { return placeOf(manifold->getContactPoint(i)) != 0; });
     if (m_pointsPerCollision == 2 && count > 2) {
-        // With places it is the one that shared the first one's collision in the last step.
-        auto away = [this, manifold](int i) {
-            const btManifoldPoint &first = manifold->getContactPoint(0);
+        auto away = [this, manifold, &order](int i) {
+            const btManifoldPoint &first = manifold->getContactPoint(order[0]);
             const btManifoldPoint &point = manifold->getContactPoint(i);
-            const uint64_t kept = placeOf(first), other = placeOf(point);
             const btScalar distance = point.getPositionWorldOnB().distance2(first.getPositionWorldOnB());
-            if (kept && other) return (kept - 1) >> 2 == (other - 1) >> 2 ? btScalar(-1) : distance + 1000;
-            return distance;
+            if (wereApart(first, point)) return distance + 1000;
+            return placeOf(point) ? btScalar(-1) : distance;
         };
         std::swap(order[1], *std::min_element(order + 1, order + count,
                                               [&away](int i, int j) { return away(i) < away(j); }));
@@ -237,7 +238,9 @@ size_t ZynqPgsGather::collisionOf(btPersistentManifold *manifold, const btManifo
     const float friction = float(btMax(point.m_combinedFriction, btScalar(0)));
     for (size_t at = first; at < m_collisions.size(); at++) {
         const zpgs_collision &collision = m_collisions[at];
+        auto apart = [&](const btManifoldPoint *other) { return other && wereApart(*other, point); };
         if (collision.count < room && m_frictions[at] == friction &&
+            std::none_of(m_points[at].begin(), m_points[at].end(), apart) &&
             load(collision.normal).dot(point.m_normalWorldOnB) > SAME_NORMAL)
             return at;
     }
@@ -371,8 +374,11 @@ uint64_t ZynqPgsGather::placeOf(const btManifoldPoint &point) const {
     return m_hasPlaces && kept != 0 && (kept - 1) >> 34 == m_placesStored % STORES ? kept : 0;
 }
 
-// A collision has one place: where its points come from two collisions of the last step, those of the second
-// are new.
+bool ZynqPgsGather::wereApart(const btManifoldPoint &one, const btManifoldPoint &other) const {
+    const uint64_t first = placeOf(one), second = placeOf(other);
+    return first && second && (first - 1) >> 2 != (second - 1) >> 2;
+}
+
 void ZynqPgsGather::loadPlaces() {
     const uint8_t none = ZPGS_NEW_POINT;
     m_places.assign(m_collisions.size(), {ZPGS_NEW_COLLISION, {none, none, none, none}});
@@ -380,9 +386,8 @@ void ZynqPgsGather::loadPlaces() {
         for (uint32_t i = 0; i < m_collisions[at].count; i++) {
             const uint64_t kept = placeOf(*m_points[at][i]);
             if (kept == 0) continue;
-            const uint32_t collision = uint32_t((kept - 1) >> 2);
-            if (m_places[at].collision == ZPGS_NEW_COLLISION) m_places[at].collision = collision;
-            if (m_places[at].collision == collision) m_places[at].points[i] = uint8_t((kept - 1) & 3);
+            m_places[at].collision = uint32_t((kept - 1) >> 2);
+            m_places[at].points[i] = uint8_t((kept - 1) & 3);
         }
 }
 

@@ -80,6 +80,8 @@ private:
     uint32_t shapeOf(btScalar inverseMass, const btVector3 &inverseInertia);
     void clearGathered();
     uint64_t placeOf(const btManifoldPoint &point) const;
+    // Whether the points are of two collisions of the last step. As a collision has one place, they share none.
+    bool wereApart(const btManifoldPoint &one, const btManifoldPoint &other) const;
 
     // Bullet's points of a collision: element i is that of contact i; the rest is null.
     using Points = std::array<btManifoldPoint *, ZPGS_CONTACT_POINTS>;

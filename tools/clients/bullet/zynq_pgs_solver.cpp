@@ -206,7 +206,8 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
 // program may read them in Bullet's points.
 void ZynqPgsSolver::loadImpulses(const btContactSolverInfo &info, zpgs_parameters &parameters) {
     const bool has = m_options.warmStart && m_boardImpulses != Impulses::Lacks;
-    const bool warm = has && (info.m_solverMode & SOLVER_USE_WARMSTARTING);
+    const bool warm =
+        has && (info.m_solverMode & SOLVER_USE_WARMSTARTING) && info.m_warmstartingFactor > 0;
     parameters.warm_start = warm;
     parameters.impulses_out = has;
     if (m_options.byPlace) m_gather.loadPlaces();

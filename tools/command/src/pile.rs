@@ -19,7 +19,7 @@ use crate::options::scenes;
 /// Fails where the grid has too many bodies.
 pub fn build(grid: Grid, drop: f32) -> Result<Scene> {
     scenes::check_rows(grid)?;
-    Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).map_err(Failure::input)
+    Scene::new(&SceneOptions { grid, drop }).map_err(Failure::input)
 }
 
 /// Opens a board and gives it a pile, unless the pile is too large for the board.

@@ -9,9 +9,9 @@ use zynq_pgs::Body as DriverBody;
 use crate::outcome::Outcome;
 use crate::scene::{Arguments, Body, Collision, Scene, Shape};
 
-/// The scene of a folder, in the order of its arrays and past a queue, for an accelerator with that form of inertia.
-/// The shapes of the folder have one moment of inertia about every axis; with world inertia each
-/// body brings it, and its mass.
+/// The scene of a folder, in the order of its arrays and past a queue, for an accelerator with that
+/// form of inertia. The shapes of the folder have one moment of inertia about every axis; with
+/// world inertia each body brings it, and its mass.
 #[must_use]
 pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
     let bits = |vector: [f32; 3]| vector.map(f32::to_bits);

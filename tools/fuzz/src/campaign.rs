@@ -1,8 +1,9 @@
 //! Runs a target many times, on several threads, under a watchdog.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -24,8 +25,6 @@ pub struct Plan {
     pub seed: u64,
     /// Threads, at least one.
     pub threads: u64,
-    /// Time limit of an execution.
-    pub limit: Duration,
 }
 
 /// The result of a campaign.
@@ -39,69 +38,66 @@ pub struct Summary {
     pub panicked: Option<u64>,
 }
 
-/// Interval of the watchdog.
+/// Time after which an execution counts as hanging.
+const LIMIT: Duration = Duration::from_secs(60);
+/// Longest time between two looks at the running executions.
 const WATCH_INTERVAL: Duration = Duration::from_millis(200);
-/// No execution.
-const NOTHING: u64 = u64::MAX;
+/// Messages that wait for the watchdog.
+const QUEUE: usize = 1024;
 
 /// Runs a target. An execution beyond its time limit cannot be stopped: it ends the program, with
 /// the command that repeats it on stderr.
 pub fn run(target: &Target, plan: &Plan) -> Summary {
     let start = Instant::now();
-    let stop = AtomicBool::new(false);
-    let threads = plan.threads.max(1);
-    // The execution of each thread.
-    let running: Vec<_> = (0..threads).map(|_| AtomicU64::new(NOTHING)).collect();
-    let last = plan.first.saturating_add(plan.executions);
-    let (sender, ended) = mpsc::channel();
+    let next = AtomicU64::new(plan.first);
+    let last = plan.first.saturating_add(plan.executions).min(u64::MAX / 2);
+    // A thread, its execution, and nothing at the beginning; at the end the counts, if it ended.
+    let (sender, messages) = mpsc::sync_channel::<(u64, u64, Option<Option<Tally>>)>(QUEUE);
     let mut summary = Summary::default();
     thread::scope(|scope| {
-        for (first, running) in (plan.first..).zip(&running) {
-            let (sender, stop) = (sender.clone(), &stop);
+        for number in 0..plan.threads.max(1) {
+            let (sender, next) = (sender.clone(), &next);
             scope.spawn(move || {
                 let mut input = Vec::new();
-                let mut own = Summary::default();
-                let mut number = first;
-                while number < last && !stop.load(Ordering::Relaxed) && start.elapsed() < plan.time
-                {
-                    random::fill(&mut input, plan.seed, target.name, number, target.longest);
-                    running.store(number, Ordering::Relaxed);
-                    let tally = catch_unwind(AssertUnwindSafe(|| (target.run)(&input)));
-                    running.store(NOTHING, Ordering::Relaxed);
-                    own.executions += 1;
-                    match tally {
-                        Ok(tally) => own.tally += tally,
-                        Err(_) => {
-                            own.panicked = Some(number);
-                            stop.store(true, Ordering::Relaxed);
-                        }
+                while start.elapsed() < plan.time {
+                    let execution = next.fetch_add(1, Ordering::Relaxed);
+                    // The receiver lives until the last sender is gone.
+                    if execution >= last || sender.send((number, execution, None)).is_err() {
+                        break;
                     }
-                    number = number.saturating_add(threads);
+                    random::fill(&mut input, plan.seed, target.name, execution, target.longest);
+                    let tally = catch_unwind(AssertUnwindSafe(|| (target.run)(&input))).ok();
+                    if tally.is_none() {
+                        next.store(last, Ordering::Relaxed);
+                    }
+                    let _ = sender.send((number, execution, Some(tally)));
                 }
-                // The receiver lives until the last sender is gone.
-                let _ = sender.send(own);
             });
         }
         drop(sender);
-        let mut before = Vec::new();
-        let mut since = Instant::now();
+        let mut running = BTreeMap::new();
         loop {
-            match ended.recv_timeout(WATCH_INTERVAL) {
-                Ok(own) => {
-                    summary.executions += own.executions;
-                    summary.tally += own.tally;
-                    summary.panicked = summary.panicked.into_iter().chain(own.panicked).min();
+            match messages.recv_timeout(WATCH_INTERVAL) {
+                Ok((thread, execution, None)) => {
+                    running.insert(thread, (execution, Instant::now()));
+                }
+                Ok((thread, execution, Some(ended))) => {
+                    running.remove(&thread);
+                    summary.executions += 1;
+                    match ended {
+                        Some(tally) => summary.tally += tally,
+                        None => {
+                            let first = summary.panicked.unwrap_or(execution);
+                            summary.panicked = Some(first.min(execution));
+                        }
+                    }
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
-                Err(RecvTimeoutError::Timeout) => {}
-            }
-            let now: Vec<_> = running.iter().map(|at| at.load(Ordering::Relaxed)).collect();
-            let held =
-                now.iter().zip(&before).find(|(now, before)| **now != NOTHING && now == before);
-            match held {
-                Some((number, _)) if since.elapsed() > plan.limit => hung(target, plan, *number),
-                Some(_) => {}
-                None => (before, since) = (now, Instant::now()),
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Some((held, _)) = running.values().find(|of| of.1.elapsed() > LIMIT) {
+                        hung(target, plan, *held);
+                    }
+                }
             }
         }
     });
@@ -116,7 +112,7 @@ pub fn again(target: &Target, seed: u64, number: u64) -> String {
 
 #[allow(clippy::print_stderr, reason = "the program ends here")]
 fn hung(target: &Target, plan: &Plan, number: u64) -> ! {
-    eprintln!("FOUND: not finished after {:?}", plan.limit);
+    eprintln!("FOUND: not finished after {LIMIT:?}");
     eprintln!("  again: {}", again(target, plan.seed, number));
     process::exit(1)
 }
@@ -126,8 +122,7 @@ mod tests {
     use super::*;
 
     fn plan(executions: u64, threads: u64) -> Plan {
-        let limit = Duration::from_secs(20);
-        Plan { first: 0, executions, time: Duration::MAX, seed: 3, threads, limit }
+        Plan { first: 0, executions, time: Duration::MAX, seed: 3, threads }
     }
 
     fn counts(input: &[u8]) -> Tally {

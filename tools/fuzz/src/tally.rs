@@ -31,20 +31,6 @@ impl Tally {
         self.descriptors += counts.descriptors;
         self.violations += counts.violations;
     }
-
-    /// Name and value of each count.
-    #[must_use]
-    pub fn entries(&self) -> [(&'static str, u64); 7] {
-        [
-            ("steps", self.steps),
-            ("refused", self.refused),
-            ("registers", self.registers),
-            ("beats", self.beats),
-            ("descriptors", self.descriptors),
-            ("violations", self.violations),
-            ("faults", self.faults),
-        ]
-    }
 }
 
 impl AddAssign for Tally {

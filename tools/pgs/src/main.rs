@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+mod a53;
 mod bug_report;
 mod cli;
 mod difference;

@@ -28,7 +28,7 @@ pub const OPERATORS: &[Source<'_>] = sources! {
 
 /// All other hand-written modules, each after the modules that it is made of.
 pub const AROUND: &[Source<'_>] = sources! {
-    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "simple_dual_port",
+    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "ram_tile", "ram_lane",
         "true_dual_port";
     "stream/": "word_sum", "receiver", "sender";
     "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator", "step_sequence";

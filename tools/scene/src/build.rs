@@ -16,27 +16,10 @@ const SPACING: f32 = 2.2;
 pub(crate) const STATIC_SHAPE: u32 = 0;
 pub(crate) const CUBE_SHAPE: u32 = 1;
 
-/// The inverse inertia of the cubes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Inertia {
-    /// Bullet's value on registering the cube: 0.36761099 1/(kg m²). Bullet enlarges the box by
-    /// its margin, and takes the full size in place of half of it.
-    #[default]
-    Bullet,
-    /// The value of a cube of 1 kg and 2 m: 1.5 1/(kg m²).
-    Textbook,
-}
-
-impl Inertia {
-    /// The inverse inertia about every axis, 1/(kg m²).
-    #[must_use]
-    pub const fn inverse(self) -> f32 {
-        match self {
-            Self::Bullet => f32::from_bits(0x3EBC_3782),
-            Self::Textbook => 1.5,
-        }
-    }
-}
+/// The inverse inertia of the cubes about every axis, 1/(kg m²): Bullet's value on registering the
+/// cube, 0.36761099. Bullet enlarges the box by its margin, and takes the full size in place of half
+/// of it; a textbook has 1.5.
+const CUBE_INVERSE_INERTIA: f32 = f32::from_bits(0x3EBC_3782);
 
 /// The options of a scene. The default is the thesis' scene, dropped from 5 m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,13 +28,11 @@ pub struct SceneOptions {
     pub grid: Grid,
     /// Height of the lowest layer's underside above the ground at the start, m.
     pub drop: f32,
-    /// Inverse inertia of the cubes.
-    pub inertia: Inertia,
 }
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self { grid: Grid::default(), drop: 5.0, inertia: Inertia::default() }
+        Self { grid: Grid::default(), drop: 5.0 }
     }
 }
 
@@ -99,7 +80,7 @@ impl Scene {
                 }
             }
         }
-        Ok(Self::on_ground(&[cube(options.inertia)], bodies))
+        Ok(Self::on_ground(&[cube()], bodies))
     }
 
     /// Puts `bodies` on the ground; their shapes are numbered from 1 in the order of `kinds`.
@@ -224,8 +205,8 @@ pub(crate) fn check_drop(drop: f32) -> Result<f32, SceneError> {
 }
 
 /// The cubes' shape.
-pub(crate) fn cube(inertia: Inertia) -> (Shape, Geometry) {
-    (Shape::isotropic(1.0, inertia.inverse()), Geometry::CUBE)
+pub(crate) fn cube() -> (Shape, Geometry) {
+    (Shape::isotropic(1.0, CUBE_INVERSE_INERTIA), Geometry::CUBE)
 }
 
 /// A body at rest, with its axes along the world's.
@@ -243,7 +224,7 @@ mod tests {
 
     fn scene(grid: &str, drop: f32) -> Scene {
         let grid = grid.parse().expect("a grid");
-        Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).expect("a scene")
+        Scene::new(&SceneOptions { grid, drop }).expect("a scene")
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! ```
 //! use scene::{Grid, Scene, SceneOptions};
 //!
-//! let options = SceneOptions { grid: "3x2x3".parse::<Grid>()?, drop: 0.0, ..Default::default() };
+//! let options = SceneOptions { grid: "3x2x3".parse::<Grid>()?, drop: 0.0 };
 //! let mut scene = Scene::new(&options)?;
 //! assert_eq!(scene.detect().len(), 9 + 25); // on the ground, and one layer on the other
 //! let (bodies, collisions) = scene.parts_mut();
@@ -30,7 +30,6 @@ mod detect;
 mod error;
 #[cfg(test)]
 mod fixtures;
-mod frames;
 mod geometry;
 mod grid;
 mod hull;
@@ -41,10 +40,9 @@ mod shapes;
 mod spheres;
 mod warm_start;
 
-pub use build::{DROP_MAX, Inertia, Scene, SceneOptions};
+pub use build::{DROP_MAX, Scene, SceneOptions};
 pub use detect::{DetectionTimes, MARGIN};
 pub use error::SceneError;
-pub use frames::{StepClock, interpolate};
 pub use geometry::Geometry;
 pub use grid::Grid;
 pub use hull::faces as hull_faces;

@@ -3,7 +3,7 @@
 use pgs_support::float_env::standard;
 use zynq_pgs::Body;
 
-use crate::build::{CUBE_SHAPE, Inertia, STATIC_SHAPE, Scene, at_rest, cube};
+use crate::build::{CUBE_SHAPE, STATIC_SHAPE, Scene, at_rest, cube};
 use crate::{GROUND_HALF_EXTENT, SceneError};
 
 /// How far the length of a unit quaternion may lie from 1.
@@ -31,7 +31,7 @@ impl Scene {
             return Err(SceneError::Ground { found: Some(ground.pose) });
         }
         let cubes = cubes.iter().map(|body| Body { shape: CUBE_SHAPE, ..*body }).collect();
-        Ok(Self::on_ground(&[cube(Inertia::default())], cubes))
+        Ok(Self::on_ground(&[cube()], cubes))
     }
 }
 
@@ -61,7 +61,7 @@ mod tests {
 
     fn scene(grid: &str) -> Scene {
         let grid = grid.parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         Scene::new(&options).expect("a scene")
     }
 

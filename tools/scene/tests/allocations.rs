@@ -28,7 +28,7 @@ const STEPS: usize = 8 * WAY;
 /// The number of collisions in each step, and the number of allocations.
 fn detect(grid: &str, threads: usize) -> (Vec<usize>, Vec<u64>) {
     let grid = grid.parse().expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a scene");
     scene.set_threads(threads);
     let mut counted = Vec::with_capacity(STEPS);

@@ -35,7 +35,7 @@ fn scenes_and_their_collisions_are_the_same_in_every_environment() {
     }
     // Several threads start from about a thousand bodies, and share the work from some thousands.
     let grid = "20x12x20".parse().expect("a grid");
-    let cubes = SceneOptions { grid, drop: 0.013, ..SceneOptions::default() };
+    let cubes = SceneOptions { grid, drop: 0.013 };
     let shapes = ShapesOptions { grid, drop: 0.0, seed: 5 };
     let expected = piles(&cubes, &shapes, 1);
     assert!(expected.iter().all(|(_, collisions)| collisions.len() > 50));

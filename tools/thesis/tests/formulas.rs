@@ -16,7 +16,7 @@ fn step(
 ) -> (StepReport, StepShape) {
     let [x, y, z] = grid;
     let grid = Grid::new(x, y, z).expect("a grid");
-    let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+    let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a scene");
     let build = Build { profile: Some(profile), bandwidth: Some(bandwidth), ..Build::default() };
     let board = BoardChoice::Built(build.config());

@@ -1,6 +1,8 @@
-//! Puts tests in a caller's environment that is not the standard one, and says whether it is still there.
+//! Puts tests in a caller's environment that is not the standard one, and says whether it is still
+//! there.
 //!
-//! Feature `foreign-environment`, for tests alone: Rust does not promise what its code computes there.
+//! Feature `foreign-environment`, for tests alone: Rust does not promise what its code computes
+//! there.
 
 use super::apart;
 use super::registers::Registers;
@@ -32,8 +34,8 @@ impl Environment {
 /// Does some work in an environment, and restores the previous one.
 ///
 /// # Safety
-/// The work computes nothing in floating point but in [`standard`](super::standard), and nothing that it
-/// calls does: in another environment Rust's arithmetic is undefined.
+/// The work computes nothing in floating point but in [`standard`](super::standard), and nothing
+/// that it calls does: in another environment Rust's arithmetic is undefined.
 pub unsafe fn under<R>(environment: Environment, work: impl FnOnce() -> R) -> R {
     let _restored = Restored(Registers::read());
     environment.0.restore();

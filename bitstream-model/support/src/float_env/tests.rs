@@ -13,7 +13,8 @@ fn computed() -> [u32; 4] {
     [one / three, -one / three, tiny / three, black_box(tiny / 4.0) * 4.0].map(f32::to_bits)
 }
 
-/// That of the standard environment, by hand: 1/3 is 0xAAAAAA.AA... 2^-25, the subnormals in units of 2^-149.
+/// That of the standard environment, by hand: 1/3 is 0xAAAAAA.AA... 2^-25, the subnormals in units
+/// of 2^-149.
 const EXPECTED: [u32; 4] = [0x3EAA_AAAB, 0xBEAA_AAAB, 0x002A_AAAB, 0x0080_0000];
 
 /// Does something in the present environment and in every caller's; each must stay as it was.
@@ -35,8 +36,8 @@ fn other_environments_compute_something_else() {
     for (name, environment) in environments() {
         // A trap would end the test, and no NaN is computed.
         if !["every exception traps", "default NaN"].contains(&name) {
-            // SAFETY: the operands of this arithmetic are hidden from the compiler, and whatever comes of it
-            // is taken.
+            // SAFETY: the operands of this arithmetic are hidden from the compiler, and whatever
+            // comes of it is taken.
             let found = unsafe { under(environment, computed) };
             assert_ne!(found, EXPECTED, "{name}");
         }

@@ -227,8 +227,8 @@ pub trait Instructions: Copy + Debug {
     }
 }
 
-/// The number of binary16 nearest to a number; a tie goes to the even one. It has no branch, so that
-/// the compiler vectorises it.
+/// The number of binary16 nearest to a number; a tie goes to the even one. It has no branch, so
+/// that the compiler vectorises it.
 #[inline(always)]
 fn nearest_binary16(value: f32) -> f32 {
     const EXPONENT: u32 = 0x7F80_0000;

@@ -1,4 +1,4 @@
-//! Counts instructions of the yardstick and of packing with valgrind, free of the noise of times;
+//! Counts instructions of the yardstick with valgrind, free of the noise of times;
 //! and runs a single item for tools that count.
 
 use std::error::Error;
@@ -6,11 +6,10 @@ use std::process::Command;
 
 use bench::step::{Emulated, Step};
 use bitstream_model::BoardConfig;
-use bitstream_model::interface::profile::{FLOAT, Profile};
+use bitstream_model::interface::profile::Profile;
 use clap::ValueEnum;
 use yardstick::Yardstick;
 use zynq_pgs::StepParameters;
-use zynq_pgs::bench::StepPacker;
 
 use crate::{Options, Outcome};
 
@@ -35,8 +34,6 @@ const GRID: &str = "10x10x10";
 pub(crate) enum Only {
     /// Solve the step with the yardstick
     Yardstick,
-    /// Pack the step, its collisions as they are given
-    Pack,
     /// Take the step on the emulated board of a profile
     Emulated,
 }
@@ -48,14 +45,6 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
             let in_order = step.in_order(BoardConfig::default())?;
             let Step { shapes, bodies, parameters, .. } = step;
             Yardstick::new(shapes, bodies, &in_order, parameters).solve();
-        }
-        (Only::Pack, None) => {
-            let mut packer = StepPacker::new(FLOAT.default_variant(), Some(1));
-            let parameters = StepParameters::default();
-            let with = (None, &parameters);
-            packer
-                .pack(&step.bodies, &step.collisions, &step.shapes, with)?
-                .ok_or("the step is refused")?;
         }
         (Only::Emulated, Some(profile)) => {
             let profile = Profile::by_name(profile).ok_or("--profile: no profile has this name")?;
@@ -73,22 +62,14 @@ pub(crate) fn run(only: Only, profile: Option<&str>, step: &Step) -> Result<(), 
     Ok(())
 }
 
-/// Whether valgrind is installed; reports if not.
-pub(crate) fn is_there(section: &str) -> bool {
-    let there = Command::new("valgrind").arg("--version").output().is_ok();
-    if !there {
-        eprintln!("skipped: {section} (valgrind is not installed)");
-    }
-    there
-}
-
 pub(crate) fn measure(options: &Options) -> Outcome {
-    if !is_there("instructions") {
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        eprintln!("skipped: instructions (valgrind is not installed)");
         return Ok(());
     }
     let mut counts = Vec::new();
     for (function, passes) in COUNTED {
-        let (instructions, parameters, collisions) = count(options, Only::Yardstick, function)?;
+        let (instructions, parameters, collisions) = count(options, function)?;
         let passes = f64::from(passes(&parameters));
         counts.push(instructions / (collisions * passes));
     }
@@ -102,16 +83,11 @@ pub(crate) fn measure(options: &Options) -> Outcome {
 }
 
 /// Instructions of a function, with the iterations of the step and its collisions.
-pub(crate) fn count(
-    options: &Options,
-    only: Only,
-    function: &str,
-) -> Result<(f64, StepParameters, f64), Box<dyn Error>> {
+fn count(options: &Options, function: &str) -> Result<(f64, StepParameters, f64), Box<dyn Error>> {
     let mut command = Command::new("valgrind");
     command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
     command.arg(format!("--toggle-collect={function}"));
-    command.arg(std::env::current_exe()?).arg("--only");
-    command.args(only.to_possible_value().map(|value| value.get_name().to_owned()));
+    command.arg(std::env::current_exe()?).args(["--only", "yardstick"]);
     match &options.input {
         Some(folder) => command.arg("--input").arg(folder),
         None => command.args(["--grid", GRID, "--steps", "2"]),

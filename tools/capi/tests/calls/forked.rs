@@ -8,7 +8,7 @@ use zynq_pgs_c::*;
 use crate::support::*;
 
 /// The calls of a child with its parent's accelerator, and their statuses.
-fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 14] {
+fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 15] {
     let all = [collision()];
     let (bodies, given, parameters) = (arrays(crates), collisions(&all), defaults());
     let (b, c, p) = (from_ref(&bodies), from_ref(&given), from_ref(&parameters));
@@ -25,6 +25,7 @@ fn statuses(open: &Open, crates: &mut [Crate]) -> [Status; 14] {
         made!(zpgs_end(handle, b, p)),
         made!(zpgs_read_impulses(handle, none, 0)),
         made!(zpgs_commit(handle, c)),
+        made!(zpgs_forget(handle, 0)),
         made!(zpgs_set_shapes(handle, SHAPES.as_ptr(), SHAPES.len())),
         made!(zpgs_cancel(handle)),
         made!(zpgs_step(handle, null(), null(), null(), null_mut())),
@@ -39,7 +40,7 @@ fn a_forked_child_is_refused_and_closes_and_the_parents_step_goes_on() {
     let parent = std::process::id().to_string();
     let in_child = || {
         let mut crates = world();
-        if statuses(&open, &mut crates) != [Status::Forked; 14] || crates != world() {
+        if statuses(&open, &mut crates) != [Status::Forked; 15] || crates != world() {
             return 1;
         }
         let text = open.text();

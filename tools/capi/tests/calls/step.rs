@@ -133,6 +133,10 @@ fn impulses_come_by_place_from_the_step_that_was_committed() {
     }
     // Another world has another last step.
     assert_eq!(open.step(&arrays(&mut crates), &given(&same, 8), &parameters), Status::Input);
+    let cold = CollisionArray { factor: 0.0, ..given(&same, 7) };
+    assert_eq!(open.step(&arrays(&mut crates), &cold, &parameters), Status::Argument);
+    assert!(open.text().contains("with 0 as the factor"), "{}", open.text());
+    assert_eq!(open.step(&arrays(&mut crates), &cold, &defaults()), Status::Ok, "not warm");
     let wrong = place(0, 4);
     assert_eq!(open.step(&arrays(&mut crates), &given(&wrong, 7), &parameters), Status::Input);
     assert!(open.text().contains("contact point 0"), "{}", open.text());
@@ -143,6 +147,10 @@ fn impulses_come_by_place_from_the_step_that_was_committed() {
     both.impulses = StridedConst { data: out.as_ptr().cast(), stride: size_of::<Impulses>() };
     assert_eq!(open.step(&arrays(&mut crates), &both, &parameters), Status::Argument);
     assert!(open.text().contains("set one of them to null"), "{}", open.text());
+    assert_eq!(made!(zpgs_forget(open.0, 7)), Status::Ok, "{}", open.text());
+    assert_eq!(open.step(&arrays(&mut crates), &given(&same, 7), &parameters), Status::Input);
+    assert!(open.text().contains("that step had 0 collisions"), "{}", open.text());
+    assert_eq!(made!(zpgs_forget(open.0, 7)), Status::Ok, "nothing is kept");
 }
 
 #[test]

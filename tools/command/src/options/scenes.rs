@@ -5,7 +5,7 @@ use std::hint::black_box;
 use bitstream_model::BoardConfig;
 use bitstream_model::interface::profile::Inertia as Form;
 use clap::{Args, ValueEnum};
-use scene::{Grid, Inertia, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
+use scene::{Grid, SHAPE_FRICTIONS, Scene, SceneOptions, ShapesOptions};
 use serde_json::{Value, json};
 use step_folder::npy;
 use zynq_pgs::Capabilities;
@@ -39,9 +39,6 @@ pub struct SceneArgs {
     /// Height of the lowest bodies above the ground at the start, m.
     #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
     drop: f32,
-    /// Inverse inertia of the cubes: Bullet's (0.3676), or a textbook's (1.5) [default: bullet]
-    #[arg(long, value_enum)]
-    cube_inertia: Option<CubeInertia>,
     /// Seed of the shapes' kinds and orientations [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -51,21 +48,6 @@ pub struct SceneArgs {
 enum SceneName {
     Cubes,
     Shapes,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum CubeInertia {
-    Bullet,
-    Textbook,
-}
-
-impl From<CubeInertia> for Inertia {
-    fn from(name: CubeInertia) -> Self {
-        match name {
-            CubeInertia::Bullet => Self::Bullet,
-            CubeInertia::Textbook => Self::Textbook,
-        }
-    }
 }
 
 fn drop_height(text: &str) -> Result<f32, String> {
@@ -140,11 +122,7 @@ impl SceneArgs {
                 let error = "--seed is for --scene shapes, the cubes are not placed at random";
                 return Err(Failure::input(error));
             }
-            SceneName::Cubes => Scene::new(&SceneOptions { grid, drop, inertia: self.inertia() }),
-            SceneName::Shapes if self.cube_inertia.is_some() => {
-                let error = "--cube-inertia is for --scene cubes, the shapes have a textbook's";
-                return Err(Failure::input(error));
-            }
+            SceneName::Cubes => Scene::new(&SceneOptions { grid, drop }),
             SceneName::Shapes => Scene::of_shapes(&ShapesOptions { grid, drop, seed: self.seed() }),
         };
         let mut scene = built.map_err(Failure::input)?;
@@ -163,10 +141,6 @@ impl SceneArgs {
     pub fn config(&self, build: &Build) -> BoardConfig {
         let inertia = (!self.is_cubes()).then_some(Form::World);
         Build { inertia: build.inertia.or(inertia), ..*build }.config()
-    }
-
-    fn inertia(&self) -> Inertia {
-        self.cube_inertia.map_or(Inertia::default(), Into::into)
     }
 
     fn seed(&self) -> u64 {
@@ -221,11 +195,7 @@ impl SceneArgs {
             "scene": if cubes { "cubes" } else { "shapes" },
             "grid": self.grid().to_string(),
             "drop_m": self.drop,
-            "inertia": match self.inertia() {
-                _ if !cubes => None,
-                Inertia::Bullet => Some("bullet"),
-                Inertia::Textbook => Some("textbook"),
-            },
+            "inertia": cubes.then_some("bullet"),
             "seed": (!cubes).then(|| self.seed()),
         })
     }

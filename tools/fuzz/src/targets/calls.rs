@@ -8,9 +8,9 @@ use std::ptr;
 use zynq_pgs_c::{
     AcceleratorHandle, BodyArrays, Collision, CollisionArray, Impulses, Parameters, Place, Report,
     Shape, Status, Strided, StridedConst, ZPGS_NEW_COLLISION, ZPGS_NEW_POINT, zpgs_begin,
-    zpgs_cancel, zpgs_close, zpgs_commit, zpgs_end, zpgs_last_error, zpgs_open, zpgs_prepare,
-    zpgs_push, zpgs_read_impulses, zpgs_set_shapes, zpgs_start, zpgs_step, zpgs_submit, zpgs_wait,
-    zpgs_wait_and_start,
+    zpgs_cancel, zpgs_close, zpgs_commit, zpgs_end, zpgs_forget, zpgs_last_error, zpgs_open,
+    zpgs_prepare, zpgs_push, zpgs_read_impulses, zpgs_set_shapes, zpgs_start, zpgs_step,
+    zpgs_submit, zpgs_wait, zpgs_wait_and_start,
 };
 
 use crate::input::Input;
@@ -267,7 +267,7 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
     let (given, wanted) = (bodies.structure.pointer(), collisions.structure.pointer());
     let (steps, told) = (parameters.pointer(), report.pointer::<Report>());
     let mut started = Status::Ok;
-    let choice = input.below(13);
+    let choice = input.below(14);
     let status = match choice {
         // `run` has opened the handle, and this thread alone uses it. A `Sized` has room for the
         // largest structure that the interface takes, and a `Column` for every element at its
@@ -305,6 +305,8 @@ fn call(input: &mut Input<'_>, handle: *mut AcceleratorHandle, tally: &mut Tally
         10 if input.one_in(4) => unsafe { zpgs_cancel(handle) },
         // SAFETY: the handle is open; collisions have room.
         12 => unsafe { zpgs_commit(handle, wanted) },
+        // SAFETY: the handle is open.
+        13 => unsafe { zpgs_forget(handle, input.below(3)) },
         // SAFETY: the handle is open; bodies, collisions, parameters and report have room.
         _ => unsafe { zpgs_step(handle, given, wanted, steps, told) },
     };

@@ -1,13 +1,8 @@
 //! Takes random steps of the driver on a board that checks every access.
 
 use bitstream_model::EmulatedBoard;
-use zynq_pgs::scene::{BodyArrays, CollisionArrays};
-use zynq_pgs::{
-    Accelerator, BoardChoice, Body, Error, Fault, OpenOptions, StepParameters, StepReport,
-    WarmCollisions,
-};
+use zynq_pgs::{Accelerator, BoardChoice, Error, Fault, OpenOptions};
 
-use super::layout::{SeparateBodies, SeparateCollisions, StridedBodies, StridedCollisions};
 use super::scenes::{InvalidValues, Scene, bits, parameters};
 use crate::boards;
 use crate::input::Input;
@@ -15,15 +10,6 @@ use crate::tally::Tally;
 
 /// Most steps of one execution.
 const STEPS_MAX: u32 = 24;
-
-/// The storage of bodies and collisions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
-    Structures,
-    Separate,
-    /// Records with this many words between them.
-    Strided(usize),
-}
 
 /// One execution.
 pub(super) fn run(bytes: &[u8]) -> Tally {
@@ -60,7 +46,7 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     tally
 }
 
-/// Takes a step; sometimes also the same step in another layout.
+/// Takes a step; sometimes twice.
 fn step(
     input: &mut Input<'_>,
     accelerator: &mut Accelerator,
@@ -71,12 +57,15 @@ fn step(
     let variant = accelerator.capabilities().variant;
     let parameters = parameters(input, passes, InvalidValues::Sometimes, &variant);
     scene.suit(input, &parameters, InvalidValues::Sometimes);
-    let first = layout(input);
-    let again = input.one_in(4).then(|| layout(input));
-    let (bodies, ended) = step_in(first, accelerator, scene, &parameters);
-    if let Some(again) = again {
-        let (bodies_again, ended_again) = step_in(again, accelerator, scene, &parameters);
-        assert_eq!(bits(&bodies), bits(&bodies_again), "{first:?} and {again:?}");
+    let mut take = || {
+        let mut bodies = scene.bodies.clone();
+        let ended = accelerator.step(&mut bodies, &scene.given(), &parameters);
+        (bodies, ended)
+    };
+    let (bodies, ended) = take();
+    if input.one_in(4) {
+        let (bodies_again, ended_again) = take();
+        assert_eq!(bits(&bodies), bits(&bodies_again), "the same step twice");
         assert_eq!(ended.is_ok(), ended_again.is_ok(), "{ended:?}, {ended_again:?}");
         tally.steps += u64::from(ended_again.is_ok());
         tally.refused += u64::from(ended_again.is_err());
@@ -111,52 +100,4 @@ fn check_refusal(error: &Error) {
         _ => false,
     };
     assert!(by_input && !error.must_reopen(), "{error}: {error:?}");
-}
-
-fn layout(input: &mut Input<'_>) -> Layout {
-    match input.below(4) {
-        0 => Layout::Structures,
-        1 => Layout::Separate,
-        _ => Layout::Strided(input.index(12)),
-    }
-}
-
-/// The bodies of a scene in a layout, after a step.
-fn step_in(
-    layout: Layout,
-    accelerator: &mut Accelerator,
-    scene: &Scene,
-    parameters: &StepParameters,
-) -> (Vec<Body>, Result<StepReport, Error>) {
-    let impulses = &scene.impulses[..];
-    match layout {
-        Layout::Structures => {
-            let mut bodies = scene.bodies.clone();
-            let ended = accelerator.step(&mut bodies, &scene.given(), parameters);
-            (bodies, ended)
-        }
-        Layout::Separate => {
-            let mut separate = SeparateBodies::new(&scene.bodies);
-            let SeparateCollisions { bodies, normals, counts, contacts } =
-                &SeparateCollisions::new(&scene.collisions);
-            let collisions = CollisionArrays { bodies, normals, counts, contacts };
-            let mut bodies = BodyArrays {
-                positions: &mut separate.positions,
-                orientations: &mut separate.orientations,
-                linear_velocities: &mut separate.linear,
-                angular_velocities: &mut separate.angular,
-                shapes: &separate.shapes,
-            };
-            let warm = WarmCollisions { collisions: &collisions, impulses };
-            let ended = accelerator.step(&mut bodies, &warm, parameters);
-            (separate.bodies(), ended)
-        }
-        Layout::Strided(gap) => {
-            let mut bodies = StridedBodies::new(&scene.bodies, gap);
-            let collisions = StridedCollisions::new(&scene.collisions, gap);
-            let warm = WarmCollisions { collisions: &collisions, impulses };
-            let ended = accelerator.step(&mut bodies, &warm, parameters);
-            (bodies.bodies(), ended)
-        }
-    }
 }

@@ -130,37 +130,29 @@ fn check(folder: &Folder, files: &[Array]) {
         bits(&folder.bodies.iter().flat_map(of).collect::<Vec<_>>())
     };
     let shape = |body: &zynq_pgs::Body| folder.shapes[body.shape as usize];
-    assert_eq!(bodies(&|body| body.pose.position.to_vec()), file(BODY_POSITION));
-    assert_eq!(bodies(&|body| body.pose.orientation.to_vec()), file(BODY_ORIENTATION));
-    assert_eq!(bodies(&|body| body.velocity.linear.to_vec()), file(BODY_LINEAR));
-    assert_eq!(bodies(&|body| body.velocity.angular.to_vec()), file(BODY_ANGULAR));
-    assert_eq!(bodies(&|body| vec![shape(body).inverse_mass]), file(BODY_INVERSE_MASS));
-    assert_eq!(bodies(&|body| shape(body).inverse_inertia.to_vec()), file(BODY_INVERSE_INERTIA));
-    let collisions = &folder.collisions;
-    let pairs: Vec<u32> = collisions.iter().flat_map(|c| [c.body_a, c.body_b]).collect();
-    assert_eq!(pairs, file(COLLISION_BODIES));
-    let counts: Vec<u32> = collisions.iter().map(|c| c.count).collect();
-    assert_eq!(counts, file(COLLISION_COUNT));
-    let normals: Vec<f32> = collisions.iter().flat_map(|c| c.normal).collect();
-    assert_eq!(bits(&normals), file(COLLISION_NORMAL));
-    let contacts = collisions.iter().flat_map(|c| c.contacts);
-    let points: Vec<f32> =
-        contacts.flat_map(|c| [c.point[0], c.point[1], c.point[2], c.distance]).collect();
-    assert_eq!(bits(&points), file(COLLISION_POINTS));
+    let collisions = || folder.collisions.iter();
+    let contacts = collisions().flat_map(|c| c.contacts);
+    let points: Vec<f32> = contacts.flat_map(|c| [&c.point[..], &[c.distance]].concat()).collect();
+    let normals: Vec<f32> = collisions().flat_map(|c| c.normal).collect();
     let of = &folder.parameters;
-    let [x, y, z] = of.gravity;
-    let parameters = [
-        of.time_step,
-        of.position_drift,
-        of.position_coefficient,
-        of.friction,
-        of.angular_damping,
-        x,
-        y,
-        z,
-    ];
-    assert_eq!(bits(&parameters), file(PARAMS));
-    assert_eq!(vec![of.contact_iterations, of.friction_iterations], file(ITERATIONS));
+    let numbers =
+        [of.time_step, of.position_drift, of.position_coefficient, of.friction, of.angular_damping];
+    for (name, found) in [
+        (BODY_POSITION, bodies(&|body| body.pose.position.to_vec())),
+        (BODY_ORIENTATION, bodies(&|body| body.pose.orientation.to_vec())),
+        (BODY_LINEAR, bodies(&|body| body.velocity.linear.to_vec())),
+        (BODY_ANGULAR, bodies(&|body| body.velocity.angular.to_vec())),
+        (BODY_INVERSE_MASS, bodies(&|body| vec![shape(body).inverse_mass])),
+        (BODY_INVERSE_INERTIA, bodies(&|body| shape(body).inverse_inertia.to_vec())),
+        (COLLISION_BODIES, collisions().flat_map(|c| [c.body_a, c.body_b]).collect()),
+        (COLLISION_COUNT, collisions().map(|c| c.count).collect()),
+        (COLLISION_NORMAL, bits(&normals)),
+        (COLLISION_POINTS, bits(&points)),
+        (PARAMS, bits(&[&numbers[..], &of.gravity].concat())),
+        (ITERATIONS, vec![of.contact_iterations, of.friction_iterations]),
+    ] {
+        assert_eq!(found, file(name), "{name}");
+    }
 }
 
 /// Fragments of a header, in the right and in the wrong place.

@@ -30,7 +30,6 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     let mut request = Request {
         bitstream: path,
         overlay: None,
-        partial: false,
         part: "XCZU9EG".parse().expect("a chip"),
         unjudged: input.one_in(4),
         manager: ManagerChoice::Automatic,

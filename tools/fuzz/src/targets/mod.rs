@@ -9,7 +9,6 @@ mod faults;
 #[path = "../../../pgs/src/loading/tests/files.rs"]
 mod files;
 mod folders;
-mod layout;
 mod loads;
 mod packets;
 mod registers;
@@ -65,7 +64,7 @@ pub const ALL: &[Target] = &[
     Target {
         name: "confinement",
         about: "random steps of the driver on every profile: no access outside the buffers of the \
-                step, a refused step changes no body, every layout has the same bits",
+                step, a refused step changes no body, a step taken twice has the same bits",
         run: confinement::run,
         longest: 768,
     },

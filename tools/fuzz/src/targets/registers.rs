@@ -70,7 +70,7 @@ impl Program<'_> {
     }
 
     fn act(&mut self) {
-        match self.input.below(24) {
+        match self.input.below(23) {
             0..=2 => {
                 let address = self.address();
                 let _ = self.host.port.read32(address);
@@ -109,8 +109,7 @@ impl Program<'_> {
                 let access = self.input.pick(&[DeviceAccess::Read, DeviceAccess::Write]);
                 self.hand_over(which, access);
             }
-            21 => self.transfer(),
-            22 => self.take_back(),
+            21 => self.take_back(),
             _ => self.release(),
         }
     }
@@ -207,19 +206,6 @@ impl Program<'_> {
         let [low, high] = halves(at);
         self.host.write(core, direction, tail, low);
         self.host.write(core, direction, tail_high, high);
-    }
-
-    /// Starts a direct transfer.
-    fn transfer(&mut self) {
-        let (core, direction) = self.channel();
-        let [low, high] = halves(self.address_near_buffer());
-        let [address, address_high, length] = [6, 7, 8].map(|k| CHANNEL_REGISTERS[k]);
-        self.host.write(core, direction, DMACR, 0x0001_7001);
-        self.host.pause(1);
-        self.host.write(core, direction, address, low);
-        self.host.write(core, direction, address_high, high);
-        let bytes = 16 * self.input.below(64);
-        self.host.write(core, direction, length, bytes);
     }
 
     fn argument(&mut self) -> Register {

@@ -68,7 +68,7 @@ pub(super) fn requests(bytes: &[u8]) -> Tally {
                 }
             }
         }
-        // Whatever they said, the next driver gets the board.
+        // The next driver gets the board all the same.
         let mut next = Driver::connect(socket);
         let hello = Request::Hello { version: VERSION }.encode();
         assert!(next.ask(&mut Input::new(&[]), hello) && next.greeted);

@@ -76,16 +76,6 @@ pub enum StepError<E> {
     },
 }
 
-/// The result of the step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Done {
-    /// Interrupts until the results arrived.
-    pub interrupts: u32,
-    /// Clock cycles of the step, as counted by the accelerator.
-    pub cycles: u32,
-}
-
 const CORES: usize = DMA_COUNT_MAX;
 /// Reads of a register within which every state that changes by time alone must change.
 const LOOKS: usize = 1000;
@@ -202,12 +192,13 @@ fn length(beats: usize) -> u32 {
     u32::try_from(beats * BEAT_BYTES).unwrap_or(u32::MAX)
 }
 
-/// Runs one step, whose interrupt must come within `patience`.
+/// Runs one step, whose interrupt must come within `patience`; returns its clock cycles, as counted
+/// by the accelerator.
 ///
 /// # Errors
 ///
 /// [`StepError`]: the machine failed, or a value is wrong.
-pub fn run<M: Machine>(machine: &mut M, patience: Duration) -> Result<Done, StepError<M::Error>> {
+pub fn run<M: Machine>(machine: &mut M, patience: Duration) -> Result<u32, StepError<M::Error>> {
     let identity = machine.read(at(control::IDENTIFICATION))?;
     expect("the accelerator", control::IDENTIFICATION_VALUE, identity)?;
     reset(machine)?;
@@ -233,7 +224,7 @@ pub fn run<M: Machine>(machine: &mut M, patience: Duration) -> Result<Done, Step
         machine.write(channel.at(TAILDESC), low)?;
         machine.write(channel.at(TAILDESC_MSB), high)?;
     }
-    let interrupts = finish(machine, patience)?;
+    finish(machine, patience)?;
     check_results(machine)?;
 
     let done = |value| ap_ctrl::DONE.of(value);
@@ -242,8 +233,7 @@ pub fn run<M: Machine>(machine: &mut M, patience: Duration) -> Result<Done, Step
     let second = machine.read(at(control::AP_CTRL))?;
     expect("ap_done at the second look, which the first one cleared", 0, done(second))?;
     expect("a sticky error", 0, machine.read(at(control::ERROR))?)?;
-    let cycles = machine.read(at(control::CYCLES_LO))?;
-    Ok(Done { interrupts, cycles })
+    Ok(machine.read(at(control::CYCLES_LO))?)
 }
 
 fn expect<E>(what: &str, expected: u32, found: u32) -> Result<(), StepError<E>> {
@@ -292,17 +282,13 @@ fn lay_out<M: Machine>(machine: &mut M, core: usize) -> Result<[u64; 2], StepErr
     let base = stream(core);
     let bus = machine.memory() + base;
     let mut data = 0;
-    let mut segments = Vec::new();
-    for beats in [&VELOCITIES[..], &COLLISION[..], &POSES[..]] {
+    let mut packets = Vec::new();
+    for (beats, times) in [(&VELOCITIES[..], 1), (&COLLISION[..], PASSES), (&POSES[..], 1)] {
         let beats = striped(beats, core);
         machine.store(base + data, &beats)?;
-        segments.push((bus + data, length(beats.len())));
+        packets.extend(vec![(bus + data, length(beats.len())); times]);
         data += (beats.len() * BEAT_BYTES) as u64;
     }
-    let [velocities, collisions, poses] = segments[..] else {
-        unreachable!("three segments were pushed");
-    };
-    let packets = [velocities].into_iter().chain([collisions; PASSES]).chain([poses]);
     let mut place = DESCRIPTORS;
     let mut tail = 0;
     for (buffer, bytes) in packets {
@@ -351,7 +337,7 @@ fn write_arguments<M: Machine>(machine: &mut M) -> Result<(), StepError<M::Error
 }
 
 /// Waits for the interrupt, acknowledges it, and checks that it does not return.
-fn finish<M: Machine>(machine: &mut M, patience: Duration) -> Result<u32, StepError<M::Error>> {
+fn finish<M: Machine>(machine: &mut M, patience: Duration) -> Result<(), StepError<M::Error>> {
     let completion = Channel { core: CORES - 1, results: true }.at(DMASR);
     if !machine.wait_interrupt(patience)? {
         let found = format!("none within {patience:?}");
@@ -365,8 +351,7 @@ fn finish<M: Machine>(machine: &mut M, patience: Duration) -> Result<u32, StepEr
     machine.unmask_interrupt()?;
     // The line is level-sensitive: an unacknowledged interrupt would return at once.
     let again = machine.wait_interrupt(Duration::from_millis(5))?;
-    expect("interrupts after the acknowledged one", 0, again.into())?;
-    Ok(1)
+    expect("interrupts after the acknowledged one", 0, again.into())
 }
 
 fn check_results<M: Machine>(machine: &mut M) -> Result<(), StepError<M::Error>> {

@@ -164,9 +164,8 @@ fn two_steps(accelerator: Option<Box<dyn ExternalAccelerator>>) {
     });
     assert_eq!(board.accelerator_error(), None);
     for done in done {
-        let done = done.expect("the step is right");
-        assert_eq!(done.interrupts, 1);
-        assert!(done.cycles > 1000, "{done:?}");
+        let cycles = done.expect("the step is right");
+        assert!(cycles > 1000, "{cycles}");
     }
     assert_eq!(board.violations(), []);
     let counts = board.counts();

@@ -56,35 +56,6 @@ pub(crate) fn nodes_by_name() -> Outcome {
     Ok(format!("{} at {:#x}, memory at {:#x}", device.node().device, CHANNEL.0, MEMORY_BASE))
 }
 
-/// No access reaches outside a region, or between its words or beats.
-pub(crate) fn confined() -> Outcome {
-    let device = UioDevice::open(ZDMA_NODE)?;
-    let mut registers = device.window("channel")?;
-    let mut refused = 0;
-    for at in [0x1000, 0x1004, 0xFFE, 1, 2, u32::MAX, u32::MAX - 3] {
-        for result in [registers.read32(at).map(|_| ()), registers.write32(at, 0)] {
-            match result {
-                Err(PlatformError::OutOfRegion { .. }) => refused += 1,
-                other => return Err(format!("register {at:#x}: {other:?}").into()),
-            }
-        }
-    }
-    let mut memory = ReservedMemory::open(UIO_MEMORY_NODE)?;
-    let mut two = [Beat::default(); 2];
-    let end = memory.bytes();
-    for at in [end, end - 16, end - 8, 8, 1, u64::MAX, u64::MAX - 15] {
-        for result in [memory.write(at, &two), memory.read(at, &mut two)] {
-            match result {
-                Err(PlatformError::OutOfRegion { .. }) => refused += 1,
-                other => return Err(format!("memory {at:#x}: {other:?}").into()),
-            }
-        }
-    }
-    registers.read32(0xFFC)?;
-    memory.read(end - 32, &mut two)?;
-    Ok(format!("{refused} accesses refused, the last word and beats allowed"))
-}
-
 /// Memory holds written data, from its first beat to its last.
 pub(crate) fn memory() -> Outcome {
     let mut memory = ReservedMemory::open(UIO_MEMORY_NODE)?;

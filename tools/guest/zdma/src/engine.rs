@@ -3,6 +3,7 @@
 //!
 //! Source: UG1087 (register reference), modules GDMA and ADMA; UG1085, "DMA controller".
 
+use std::error::Error;
 use std::time::{Duration, Instant};
 
 use zynq_pgs::interface::record::BEAT_BYTES;
@@ -38,20 +39,6 @@ const BURSTS: u32 = 0x0483_D20F;
 /// `CTRL2`: begin.
 const ENABLE: u32 = 1;
 
-/// Why a transfer failed.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum EngineError {
-    /// The platform code refused it.
-    #[error(transparent)]
-    Platform(#[from] PlatformError),
-    /// The engine reports an error.
-    #[error("expected DMA done in ISR, found {isr:#05x}")]
-    Status { isr: u32 },
-    /// The engine reports nothing in time.
-    #[error("no DMA done within {limit:?}")]
-    Late { limit: Duration },
-}
-
 /// A channel, and the memory for its transfers.
 #[derive(Debug)]
 pub(crate) struct Engine {
@@ -62,7 +49,7 @@ pub(crate) struct Engine {
 
 impl Engine {
     /// Opens both UIO nodes and stops a transfer that an earlier user may have left.
-    pub(crate) fn open(node: &str, memory: &str) -> Result<Self, EngineError> {
+    pub(crate) fn open(node: &str, memory: &str) -> Result<Self, PlatformError> {
         let memory = ReservedMemory::open(memory)?;
         let device = UioDevice::open(node)?;
         let registers = device.window("channel")?;
@@ -104,16 +91,16 @@ impl Engine {
     }
 
     /// Whether the transfer is done.
-    pub(crate) fn is_done(&self) -> Result<bool, EngineError> {
+    pub(crate) fn is_done(&self) -> Result<bool, Box<dyn Error>> {
         let isr = self.registers.read32(ISR)?;
         if isr & !HARMLESS != 0 {
-            return Err(EngineError::Status { isr });
+            return Err(format!("expected DMA done in ISR, found {isr:#05x}").into());
         }
         Ok(isr & DONE != 0)
     }
 
     /// Polls until the transfer is done.
-    pub(crate) fn poll_done(&self, limit: Duration) -> Result<(), EngineError> {
+    pub(crate) fn poll_done(&self, limit: Duration) -> Result<(), Box<dyn Error>> {
         let begin = Instant::now();
         loop {
             let last = begin.elapsed() >= limit;
@@ -121,7 +108,7 @@ impl Engine {
                 return Ok(());
             }
             if last {
-                return Err(EngineError::Late { limit });
+                return Err(format!("no DMA done within {limit:?}").into());
             }
             std::thread::yield_now();
         }

@@ -100,66 +100,36 @@ fn by_interrupt(
     Ok((count, took))
 }
 
-fn open() -> Result<Engine, crate::engine::EngineError> {
-    Engine::open(ZDMA_NODE, UIO_MEMORY_NODE)
+fn open() -> Result<Engine, Box<dyn Error>> {
+    Ok(Engine::open(ZDMA_NODE, UIO_MEMORY_NODE)?)
 }
 
-/// Every power of two from 16 bytes to 1 MiB, and its neighbours.
-pub(crate) fn sizes() -> Outcome {
-    let mut engine = open()?;
-    engine.enable_interrupt()?;
-    let (mut done, mut seed, mut slowest) = (0, 1, Duration::ZERO);
-    for power in 0..=LARGEST.ilog2() {
-        for beats in [(1usize << power) - 1, 1 << power, (1 << power) + 1] {
-            if (1..=LARGEST).contains(&beats) {
-                let error = |error| format!("{} bytes: {error}", beats * BEAT_BYTES);
-                slowest = slowest.max(by_interrupt(&mut engine, beats, seed).map_err(error)?.1);
-                done += 1;
-                seed += 1;
-            }
-        }
-    }
-    engine.disable_interrupt()?;
-    Ok(format!("{done} transfers of 16 B to 1 MiB, the slowest {slowest:?}"))
-}
-
-/// Many transfers, short and long ones in turn; every one is compared, and none may fail.
+/// Every power of two from 16 bytes to 1 MiB and its neighbours, then sizes of every octave alike;
+/// each is compared, and none may fail.
 pub(crate) fn thousand() -> Outcome {
-    const TRANSFERS: u32 = 1000;
-    /// Failed transfers that are reported; each may have taken a whole wait.
-    const ERRORS_SHOWN: usize = 5;
     let mut engine = open()?;
     engine.enable_interrupt()?;
-    let (mut bytes, mut errors, mut lost) = (0, Vec::new(), 0);
-    let mut last: Option<u32> = None;
-    for seed in 1..=TRANSFERS {
-        // Every octave alike, up to 1 MiB.
-        let octave = (seed * 7) % (LARGEST.ilog2() + 1);
-        let beats = (1usize << octave) - (seed as usize % 97) % (1usize << octave).div_ceil(2);
-        bytes += beats * BEAT_BYTES;
-        match by_interrupt(&mut engine, beats, seed) {
-            Ok((count, _)) => {
-                if last.is_some_and(|last| count != last.wrapping_add(1)) {
-                    lost += 1;
-                }
-                last = Some(count);
-            }
-            Err(error) => {
-                errors.push(format!("{seed} ({} bytes): {error}", beats * BEAT_BYTES));
-                if errors.len() == ERRORS_SHOWN {
-                    break;
-                }
-                engine.acknowledge()?;
-                engine.device.unmask()?;
-            }
+    let octaves = LARGEST.ilog2() + 1;
+    let edges = (0..octaves).map(|power| 1usize << power).flat_map(|of| [of - 1, of, of + 1]);
+    let edges = edges.filter(|beats| (1..=LARGEST).contains(beats));
+    let others = (1..).map(|number: usize| {
+        let octave = 1usize << ((number * 7) % octaves as usize);
+        octave - (number % 97) % octave.div_ceil(2)
+    });
+    let (mut bytes, mut slowest, mut last) = (0, Duration::ZERO, None);
+    for (seed, beats) in (1..=1000).zip(edges.chain(others)) {
+        let failed = |error| format!("transfer {seed} ({} bytes): {error}", beats * BEAT_BYTES);
+        let (count, took) = by_interrupt(&mut engine, beats, seed).map_err(failed)?;
+        if last.is_some_and(|last: u32| count != last.wrapping_add(1)) {
+            return Err(
+                format!("transfer {seed}: the count jumped from {last:?} to {count}").into()
+            );
         }
+        (last, slowest) = (Some(count), slowest.max(took));
+        bytes += beats * BEAT_BYTES;
     }
     engine.disable_interrupt()?;
-    if !errors.is_empty() || lost > 0 {
-        let text = format!("{} errors, {lost} jumps of the count", errors.len());
-        return Err(format!("{text}; {}", errors.join("; ")).into());
-    }
-    Ok(format!("0 errors, {bytes} bytes, one interrupt each"))
+    Ok(format!("0 errors, {bytes} bytes, one interrupt each, the slowest {slowest:?}"))
 }
 
 /// No interrupt comes, the wait ends in time, and polling finds the transfer done; afterwards

@@ -65,9 +65,6 @@ pub enum LoadError {
          bitstream, the vendor's (linux-xlnx) does", directory.display()
     )]
     NoFirmwareFile { manager: String, directory: PathBuf },
-    #[error("{manager} has no file \"flags\" in {}: it loads full bitstreams \
-        only", directory.display())]
-    NoFlags { manager: String, directory: PathBuf },
     #[error("{device} is open in {users}: DMA cores may be running")]
     InUse { device: String, users: String },
     #[error(
@@ -223,7 +220,6 @@ impl LoadError {
                  by U-Boot's `fpga load`"
                     .to_owned()
             }
-            Self::NoFlags { .. } => "load a full bitstream, without --partial".to_owned(),
             Self::InUse { .. } => "stop them, then run the command again".to_owned(),
             Self::Locked { device } => {
                 let file = device.split(' ').next().unwrap_or_default();

@@ -19,11 +19,7 @@ pub(super) struct Manager {
 
 impl Manager {
     /// The chosen manager; by default the manager of the programmable logic.
-    pub(super) fn find(
-        system: &dyn System,
-        choice: &ManagerChoice,
-        partial: bool,
-    ) -> Result<Self, LoadError> {
+    pub(super) fn find(system: &dyn System, choice: &ManagerChoice) -> Result<Self, LoadError> {
         if *choice == ManagerChoice::Unasked {
             return Err(LoadError::Unasked);
         }
@@ -37,9 +33,6 @@ impl Manager {
         }
         // The oldest vendor kernels have no flags, and load full bitstreams only.
         let has_flags = directory.join("flags").exists();
-        if partial && !has_flags {
-            return Err(LoadError::NoFlags { manager, directory });
-        }
         Ok(Self { found, has_flags })
     }
 
@@ -58,19 +51,12 @@ impl Manager {
     }
 
     /// Programs the logic and waits for it; returns the state afterwards, "operating".
-    pub(super) fn program(
-        &self,
-        system: &dyn System,
-        firmware: &str,
-        partial: bool,
-    ) -> Result<String, LoadError> {
+    pub(super) fn program(&self, system: &dyn System, firmware: &str) -> Result<String, LoadError> {
         let attribute = |name| self.found.directory.join(name);
         if self.has_flags {
             let path = attribute("flags");
-            let flags = if partial { "1" } else { "0" };
-            system
-                .write(&path, flags.as_bytes())
-                .map_err(|source| LoadError::attribute(&path, source))?;
+            // A full bitstream, whatever was loaded before.
+            system.write(&path, b"0").map_err(|source| LoadError::attribute(&path, source))?;
         }
         // The kernel answers this write when programming has ended or failed.
         let path = attribute("firmware");

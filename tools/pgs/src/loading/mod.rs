@@ -64,8 +64,6 @@ pub struct Request {
     pub bitstream: PathBuf,
     /// The file of the overlay to apply after it.
     pub overlay: Option<PathBuf>,
-    /// Whether it is a partial one.
-    pub partial: bool,
     /// The chip that the bitstream must be for.
     pub part: Chip,
     /// Whether to load files that cannot be judged or are refused for their content.
@@ -174,7 +172,7 @@ pub fn load(
     progress: &Progress,
 ) -> Result<Loaded, LoadError> {
     let mut judged = judge(request)?;
-    let manager = Manager::find(system, &request.manager, request.partial)?;
+    let manager = Manager::find(system, &request.manager)?;
     let listing = nodes(system)?;
     let devices = users::devices(system, &listing);
     let unseen = users::refuse_if_open(system, &devices)?;
@@ -215,7 +213,7 @@ pub fn load(
     users::refuse_if_open(system, &users::devices(system, &nodes(system)?))?;
     progress.reach(Stage::Programming);
     let start = Instant::now();
-    let state = manager.program(system, firmware.name(), request.partial)?;
+    let state = manager.program(system, firmware.name())?;
     let time = start.elapsed();
     progress.reach(Stage::Programmed);
     let (name, copied) = (firmware.name().to_owned(), firmware.is_copy());

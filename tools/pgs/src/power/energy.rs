@@ -22,20 +22,19 @@ impl Mean {
         if samples.len() < 2 {
             return None;
         }
-        let both = |domain| {
-            let count = samples.len() as f64;
+        let count = samples.len() as f64;
+        let of = |domain: usize| {
             let sum = |of: &dyn Fn(f64) -> f64| {
-                samples.iter().fold(0.0, |sum, watts| sum + of(watts.of(domain)))
+                samples.iter().fold(0.0, |sum, watts| sum + of(watts[domain]))
             };
             let mean = sum(&|watts| watts) / count;
             let squares = sum(&|watts| (watts - mean) * (watts - mean));
             (mean, (squares / (count - 1.0) / count).sqrt())
         };
-        let ((logic, logic_error), (processor, processor_error)) =
-            (both(Domain::Logic), both(Domain::Processor));
+        let [(logic, logic_error), (processor, processor_error)] = [of(0), of(1)];
         Some(Self {
-            watts: Watts { logic, processor },
-            error: Watts { logic: logic_error, processor: processor_error },
+            watts: [logic, processor],
+            error: [logic_error, processor_error],
             samples: samples.len(),
         })
     }
@@ -79,8 +78,8 @@ impl Energy {
 
     /// Energy of a step above idle, J.
     pub(crate) fn joules(&self, domain: Domain) -> Uncertain {
-        let (idle, busy) = (self.idle.watts.of(domain), self.busy.watts.of(domain));
-        let random = self.idle.error.of(domain).hypot(self.busy.error.of(domain));
+        let (idle, busy) = (self.idle.watts[domain as usize], self.busy.watts[domain as usize]);
+        let random = self.idle.error[domain as usize].hypot(self.busy.error[domain as usize]);
         let above = busy - idle;
         let within = (2.0 * random).hypot(GAIN_ERROR * above);
         Uncertain { value: above * self.seconds, within: within * self.seconds }
@@ -98,8 +97,8 @@ impl Energy {
                     joules.within,
                     domain.name(),
                     rails.join(", "),
-                    self.idle.watts.of(domain),
-                    self.busy.watts.of(domain),
+                    self.idle.watts[domain as usize],
+                    self.busy.watts[domain as usize],
                 )
             })
             .collect();
@@ -124,8 +123,8 @@ impl Energy {
             let joules = self.joules(domain);
             document[domain.key()] = json!({
                 "rails": rails,
-                "idle_w": self.idle.watts.of(domain),
-                "busy_w": self.busy.watts.of(domain),
+                "idle_w": self.idle.watts[domain as usize],
+                "busy_w": self.busy.watts[domain as usize],
                 "joules_a_step": joules.value,
                 "joules_within": joules.within,
             });
@@ -154,7 +153,7 @@ mod tests {
     fn a_step_has_its_share_of_the_power_above_idle() {
         let folder = monitors(&[("name", "ina226_u79", "1"), ("name", "ina226_u76", "1")]);
         let sensors = Sensors::find(folder.path()).expect("sensors");
-        let samples = |logic: [f64; 2]| logic.map(|logic| Watts { logic, processor: 1.0 });
+        let samples = |logic: [f64; 2]| logic.map(|logic| [logic, 1.0]);
         let idle = Mean::of(&samples([1.9, 2.1])).expect("samples");
         let busy = Mean::of(&samples([5.0, 5.0])).expect("samples");
         let steps = NonZeroU32::new(100).expect("steps");
@@ -171,7 +170,7 @@ mod tests {
     fn a_domain_without_sensors_has_no_power() {
         let folder = monitors(&[("name", "ina226_u79", "1")]);
         let sensors = Sensors::find(folder.path()).expect("sensors");
-        let mean = Mean::of(&[Watts { logic: 1.0, processor: 0.0 }; 3]).expect("samples");
+        let mean = Mean::of(&[[1.0, 0.0]; 3]).expect("samples");
         let steps = NonZeroU32::new(1).expect("a step");
         let energy = Energy::new(&sensors, mean, mean, Duration::from_secs(1), steps);
         let document = energy.to_json();

@@ -107,21 +107,8 @@ impl Sensor {
     }
 }
 
-/// The power of both domains at one time, W.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Watts {
-    pub(crate) logic: f64,
-    pub(crate) processor: f64,
-}
-
-impl Watts {
-    pub(crate) fn of(self, domain: Domain) -> f64 {
-        match domain {
-            Domain::Logic => self.logic,
-            Domain::Processor => self.processor,
-        }
-    }
-}
+/// The power of each of [`Domain::ALL`] at one time, W.
+pub(crate) type Watts = [f64; 2];
 
 /// All sensors of a board.
 #[derive(Debug, Clone)]
@@ -175,11 +162,7 @@ impl Sensors {
     pub(crate) fn read(&self) -> Result<Watts, SensorError> {
         let mut sum = Watts::default();
         for sensor in &self.sensors {
-            let watts = sensor.watts()?;
-            match sensor.domain {
-                Domain::Logic => sum.logic += watts,
-                Domain::Processor => sum.processor += watts,
-            }
+            sum[sensor.domain as usize] += sensor.watts()?;
         }
         Ok(sum)
     }
@@ -233,7 +216,7 @@ pub(super) mod tests {
         assert_eq!(sensors.rails(Domain::Processor), ["VCCPSINTFP"]);
         assert_eq!(sensors.interval(), Duration::from_millis(40));
         let watts = sensors.read().expect("power");
-        assert!((watts.logic - 3.0).abs() < 1e-12 && (watts.processor - 1.25).abs() < 1e-12);
+        assert!((watts[0] - 3.0).abs() < 1e-12 && (watts[1] - 1.25).abs() < 1e-12);
     }
 
     #[test]

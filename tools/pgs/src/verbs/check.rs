@@ -32,8 +32,8 @@ Examples on a board:
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, fence; a
-/// failure names the next step.
+/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, queue, fence;
+/// a failure names the next step.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
@@ -57,6 +57,8 @@ enum QuirkName {
     Version,
     /// Length registers of 14 bits, although the bitstream states another width
     Length14,
+    /// No issue queue, although the bitstream states one
+    NoQueue,
     /// The interrupt line is not connected
     NoInterrupt,
     /// The interrupt line is always high
@@ -86,6 +88,7 @@ impl QuirkName {
             Self::Identity => quirks.identification = 0xFFFF_0000,
             Self::Version => quirks.version = 0x0003_0000,
             Self::Length14 => quirks.length_register = Some(14),
+            Self::NoQueue => quirks.queue = Some(64),
             Self::NoInterrupt => quirks.interrupt = InterruptWiring::Disconnected,
             Self::StuckInterrupt => quirks.interrupt = InterruptWiring::StuckHigh,
             Self::Stale => quirks.coherency = Coherency::StaleReads { from_byte },
@@ -106,7 +109,8 @@ impl CheckArgs {
         // These two are about a fence.
         let needs = matches!(self.quirk, Some(QuirkName::OpenFence | QuirkName::NoGuard));
         let fence = config.fence.or(needs.then(Fence::default));
-        BoardConfig { quirks, fence, ..config }
+        let queue = if quirks.queue.is_some() { Some(0) } else { config.queue };
+        BoardConfig { quirks, fence, queue, ..config }
     }
 
     /// The first given option that only an emulated board has.

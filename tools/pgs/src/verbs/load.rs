@@ -37,9 +37,6 @@ pub(crate) struct LoadArgs {
     /// Compiled overlay, applied after the bitstream is loaded.
     #[arg(long, value_name = "DTBO")]
     overlay: Option<PathBuf>,
-    /// The bitstream is a partial one.
-    #[arg(long)]
-    partial: bool,
     /// Judge the files and load nothing. Needs no board.
     #[arg(long)]
     check: bool,
@@ -78,7 +75,6 @@ pub(crate) fn run(args: &LoadArgs, common: &CommonArgs, out: &mut dyn Write) -> 
     let request = Request {
         bitstream: args.file.clone(),
         overlay: args.overlay.clone(),
-        partial: args.partial,
         part: args.part,
         unjudged: args.unjudged,
         manager: common.manager.clone(),
@@ -149,10 +145,6 @@ pub(crate) fn run(args: &LoadArgs, common: &CommonArgs, out: &mut dyn Write) -> 
     Ok(Verdict::Done)
 }
 
-const fn kind(args: &LoadArgs) -> &'static str {
-    if args.partial { "partial" } else { "full" }
-}
-
 /// The facts that the files tell, for programs.
 fn document(args: &LoadArgs, judged: &Judged) -> Value {
     json!({
@@ -161,7 +153,6 @@ fn document(args: &LoadArgs, judged: &Judged) -> Value {
         "bitstream": {
             "file": args.file.display().to_string(),
             "bytes": judged.bytes(),
-            "kind": kind(args),
             "chip": judged.chip.map(|chip| chip.to_string()),
         },
         "pl_clock": {
@@ -174,7 +165,7 @@ fn document(args: &LoadArgs, judged: &Judged) -> Value {
 /// The same facts, for people.
 fn write_judged(args: &LoadArgs, judged: &Judged, out: &mut dyn Write) -> io::Result<()> {
     let (file, bytes) = (args.file.display(), judged.bytes());
-    writeln!(out, "bitstream  {file}, {bytes} bytes, {}", kind(args))?;
+    writeln!(out, "bitstream  {file}, {bytes} bytes")?;
     match judged.chip {
         Some(chip) => writeln!(out, "chip       {chip}")?,
         None => writeln!(out, "chip       not known")?,

@@ -8,6 +8,7 @@ use scene::kinetic_energy;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
+use crate::a53::HostTimes;
 use crate::bug_report::FaultArgs;
 use crate::difference::{self, Difference};
 use crate::traced::TracedArgs;
@@ -209,6 +210,7 @@ pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) ->
     let solved = StepResult {
         parameters,
         beside_bullet,
+        a53: HostTimes::of(&opened.accelerator, &report, [parameters.warm_start, false]),
         report,
         energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
         digest: format!("{:016x}", digest::of_bodies(&bodies)),
@@ -319,6 +321,8 @@ struct StepResult {
     /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
+    /// The host's time on the processor of a ZCU102, if it is counted.
+    a53: Option<HostTimes>,
     /// Before and after the step, J.
     energy: [f64; 2],
     digest: String,
@@ -359,6 +363,9 @@ impl StepResult {
             milliseconds(report.modelled_time()),
             limit_text(report.limit()),
         )?;
+        if let Some(a53) = &self.a53 {
+            fact(out, "host on an", &a53.text(1, milliseconds(report.modelled_time())))?;
+        }
         writeln!(
             out,
             "transfers  {} bytes to the board and {} back, in {} descriptors",
@@ -414,6 +421,8 @@ impl StepResult {
                 })
             })
             .collect();
+        let mut step = pgs_command::output::report_json(&self.report);
+        step["host_on_a53_ms"] = self.a53.map(|host| host.to_json()).into();
         json!({
             "schema": SCHEMA,
             "verb": "solve",
@@ -422,7 +431,7 @@ impl StepResult {
                 "friction_iterations": self.parameters.friction_iterations,
                 "integrate": self.parameters.integrate,
             },
-            "step": pgs_command::output::report_json(&self.report),
+            "step": step,
             "hazard_share": (!self.report.saturated.hazards).then(|| self.hazard_share()),
             "kinetic_energy_before_j": self.energy[0],
             "kinetic_energy_j": self.energy[1],

@@ -158,7 +158,7 @@ fn falling_back_to_the_emulated_board_is_said_without_a_warning() {
 
 #[test]
 fn run_reports_every_step_as_json() {
-    let ran = run(["--json", "--grid", "2x2x2", "--steps", "3", "--drop", "0"]);
+    let ran = run(["--json", "--grid", "4x4x4", "--steps", "3", "--drop", "0"]);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let document = ran.json();
     assert_keys(&document, &["schema", "verb", "config", "board", "complete", "steps", "digest"]);
@@ -184,10 +184,18 @@ fn run_reports_every_step_as_json() {
                 "doorbells",
                 "interrupts",
                 "host_ms",
+                "host_on_a53_ms",
             ],
         );
     }
-    assert_eq!(steps[0]["ground_pairs"], 4);
+    assert_eq!(steps[0]["ground_pairs"], 16);
+    let host = steps[2]["host_on_a53_ms"].as_object().expect("an object");
+    let sum = |skip: [&str; 2]| -> f64 {
+        let parts = host.iter().filter(|(name, _)| !skip.contains(&name.as_str()));
+        parts.map(|(_, ms)| ms.as_f64().expect("a number")).sum()
+    };
+    let step = host["step"].as_f64().expect("a number");
+    assert!(step > 0.0 && (sum(["step", "detection"]) - step).abs() < 1e-9, "{host:?}");
 }
 
 #[test]
@@ -201,8 +209,10 @@ fn reports_say_how_the_board_is_built() {
     assert_eq!(board["profile"], "half");
     assert_eq!(board["design"], "half,f32");
     assert_eq!(board["emulation"]["build"], "half,f32,unchecked,window=64");
+    assert!(ran.json()["steps"][1]["host_on_a53_ms"].is_null(), "sixteen bits are not counted");
     let text = run([&options[..], &scene[..]].concat()).stdout;
     assert!(text.contains("bitstream  half,f32, 250 MHz"), "{text}");
+    assert!(!text.contains("host on an A53"), "{text}");
 }
 
 #[test]
@@ -216,7 +226,7 @@ fn two_runs_have_one_digest_and_another_scene_has_another() {
     let first = digest(&scene);
     assert!(first.starts_with("digest     fnv1a-64 "), "{first}");
     assert_eq!(first, digest(&scene[1..]), "without the verb");
-    assert_ne!(first, digest(&[&scene[..], &["--cube-inertia", "textbook"]].concat()));
+    assert_ne!(first, digest(&["run", "--grid", "3x3x4", "--steps", "5", "--drop", "0"]));
 }
 
 #[test]

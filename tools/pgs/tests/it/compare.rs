@@ -266,7 +266,6 @@ fn wrong_usage_says_what_is_known() {
         (&["thesis", "compare", "float", "half", "--input", "/nonexistent"], "/nonexistent"),
         (&["thesis", "compare", "float", "half", "--seed", "3"], "--scene shapes"),
         (&["thesis", "formats", "--input", "x", "--profile", "half"], "--profile"),
-        (&["thesis", "formats", "--scene", "shapes", "--cube-inertia", "bullet"], "--scene cubes"),
         (&["run", "--profile", "quarter"], "naive, float, half"),
         (&["run", "--inertia", "textbook"], "isotropic, world"),
     ] {

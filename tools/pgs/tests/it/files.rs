@@ -90,14 +90,3 @@ fn a_file_that_cannot_be_written_is_refused_before_the_run() {
         &["expected a folder to write", "next: make the folder"],
     );
 }
-
-#[test]
-fn frames_a_second_lie_between_steps_and_exclude_frames_of_steps() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let poses = folder.path().join("poses.npz");
-    let files = ["--poses", text(&poses), "--frames-per-second", "25", "--json"];
-    // Seven steps of a sixtieth of a second: 0, 0.04, 0.08 s, and the last one.
-    assert_eq!(ran(&files).json()["files"]["poses"]["frames"], 4);
-    let refused = run(SCENE.iter().chain(&files).chain(&["--every", "2"]));
-    assert_eq!(refused.code, Some(2), "{}", refused.stderr);
-}

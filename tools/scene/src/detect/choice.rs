@@ -40,7 +40,7 @@ mod tests {
     #[test]
     fn the_chosen_points_are_among_all_of_them() {
         let grid = "3x3x3".parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a scene");
         // A cube right above another and turned by 45 degrees: the faces overlap in an octagon.
         let [x, y, z] = scene.bodies()[1].pose.position;

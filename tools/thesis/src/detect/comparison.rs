@@ -194,7 +194,7 @@ mod tests {
 
     fn scene() -> Scene {
         let grid = "3x3x3".parse().expect("a grid");
-        let options = SceneOptions { grid, drop: 0.0, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.0 };
         let mut scene = Scene::new(&options).expect("a scene");
         for (index, body) in (0_u8..).zip(scene.bodies_mut()).skip(1) {
             body.pose.position[1] -= 0.005 * f32::from((index - 1) / 3 % 3);

@@ -8,7 +8,7 @@
 //! This is a step in the order of the stream, as the thesis has it: an issue queue adds its filling
 //! to each pass (interface specification, cycles).
 //!
-//! A design that streams the collisions once has a formula of its own ([`window`](super::window)).
+//! A design that streams the collisions once has a formula of its own ([`Window`]).
 //!
 //! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this
 //! project's.
@@ -16,10 +16,9 @@
 use super::designs::Window;
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
-use super::window::{WindowCycles, WindowStep};
 use pgs_interface::profile::{Profile, Variant};
 
-/// Clock cycles of a step by the formula, part by part. Counts beyond 64 bits saturate.
+/// Clock cycles of a step by the formula, part by part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCycles {
     /// Velocities in; 0 where they come beside the passes.
@@ -44,38 +43,27 @@ impl StepCycles {
     #[must_use]
     pub fn new(variant: &Variant, records: Records, step: &StepShape) -> Self {
         let profile = variant.profile;
-        let window = Window::of(profile);
-        let longest = window.map(|design| WindowStep::longest(design, *step));
-        if let Some(window) = longest.and_then(|step| WindowCycles::new(variant, &step)) {
-            return Self {
-                load: 0,
-                pass: window.stream,
-                fill: window.behind.saturating_add(window.fill),
-                pose_in: 0,
-                result_out: 0,
-                integration_fill: window.integration_fill,
-                total: window.passes.saturating_add(window.integration_fill),
-            };
-        }
         let traffic = StepTraffic::new(variant, records, step);
-        let issues = step.collisions.div_ceil(u64::from(profile.collisions_per_issue).max(1));
-        let pass = issues.saturating_mul(profile.initiation_interval.into());
-        let fill = if step.passes() == 0 {
-            0
-        } else {
-            let contact = step.contact_iterations.saturating_mul(variant.contact().fill.into());
-            let friction = step.friction_iterations.saturating_mul(variant.friction().fill.into());
-            contact.saturating_add(friction)
+        let [contact, friction] = [variant.contact(), variant.friction()].map(|kind| kind.fill);
+        let (pass, fill, beside) = match Window::of(profile) {
+            None => {
+                let issues = step.collisions.div_ceil(profile.collisions_per_issue.into());
+                let fill = step.contact_iterations * u64::from(contact)
+                    + step.friction_iterations * u64::from(friction);
+                (issues * u64::from(profile.initiation_interval), fill, false)
+            }
+            Some(design) => {
+                let pass = step.collisions * design.slot(profile, step);
+                (pass, design.behind(profile, step) + u64::from(friction), true)
+            }
         };
-        let (load, pose_in, result_out) =
-            (traffic.velocities.cycles, traffic.poses.cycles, traffic.results.cycles);
+        let fill = if step.passes() == 0 { 0 } else { fill };
+        let alone = |cycles| if beside { 0 } else { cycles };
+        let load = alone(traffic.velocities.cycles);
+        let (pose_in, result_out) = (alone(traffic.poses.cycles), alone(traffic.results.cycles));
         let integration_fill = u64::from(profile.integration_fill);
-        let total = pass
-            .saturating_mul(step.passes())
-            .saturating_add(load)
-            .saturating_add(fill)
-            .saturating_add(pose_in.max(result_out))
-            .saturating_add(integration_fill);
+        let passes = pass * traffic.collision_streams + fill;
+        let total = load + passes + pose_in.max(result_out) + integration_fill;
         Self { load, pass, fill, pose_in, result_out, integration_fill, total }
     }
 

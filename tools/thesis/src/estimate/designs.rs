@@ -13,7 +13,8 @@
 //! ```
 
 use super::step::StepShape;
-use pgs_interface::number::{Numbers, StreamFormat};
+use super::thesis::recorded::{Design, FLOAT_DESIGN, HALF_DESIGN};
+use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::{
     Depth, FLOAT, HALF, NAIVE, OnChipMemory, Profile, RecordWords, Variant,
 };
@@ -89,15 +90,13 @@ pub const DESIGNS: &[&Profile] = &[&NAIVE, &FLOAT, &HALF, &MIXED, &WINDOWED, &WI
 
 /// Units, places and delay lines of a design that streams the collisions once.
 ///
-/// A unit takes an issue every initiation interval, from its passes in turn, and passes over a pass
-/// that cannot issue. When all of them can, every pass gets one entry in
-/// [`slot_cycles`](Self::slot_cycles). Pass k of a kind runs on unit k modulo the number of units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Each pass is behind the one before by the [lag](Self::lag): with a body's longest span +
+/// ceil(window / slot) + 1, every rule holds when the passes take turns. Load and integration run
+/// beside the passes. Pass k of a kind runs on unit k modulo the number of units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// Units that run contact passes.
-    pub contact_units: u32,
-    /// Units that run friction passes.
-    pub friction_units: u32,
+    /// Units that run contact passes; friction passes have the same number.
+    pub units: u32,
     /// Places for live bodies over all units. Each unit keeps the bodies in its passes in a memory
     /// of its share.
     pub slots: u32,
@@ -107,8 +106,7 @@ pub struct Window {
 }
 
 /// Two contact and two friction units, each with half of the passes.
-const TWO_OF_A_KIND: Window =
-    Window { contact_units: 2, friction_units: 2, slots: 8192, lag: 2816 };
+const TWO_OF_A_KIND: Window = Window { units: 2, slots: 8192, lag: 2816 };
 
 impl Window {
     /// Most collisions of a step, empty entries included: what the counters of the passes hold.
@@ -122,28 +120,35 @@ impl Window {
         streams_once.then_some(&TWO_OF_A_KIND)
     }
 
-    /// Cycles in which every pass issues one entry.
+    /// Issues of a unit for each streamed entry.
     #[must_use]
-    pub const fn slot_cycles(
-        &self,
-        contact_passes: u32,
-        friction_passes: u32,
-        initiation_interval: u32,
-        collisions_per_issue: u32,
-    ) -> u32 {
-        let contact = contact_passes.div_ceil(self.contact_units);
-        let friction = friction_passes.div_ceil(self.friction_units);
-        let most = if contact > friction { contact } else { friction };
-        (most * initiation_interval).div_ceil(collisions_per_issue)
+    pub fn issues_per_entry(&self, step: &StepShape) -> u64 {
+        step.contact_iterations.max(step.friction_iterations).div_ceil(self.units.into())
     }
 
-    /// Issues of a unit for each streamed entry, with four passes of each kind.
-    pub(crate) fn issues_per_entry(&self) -> u32 {
-        let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
-        let of = |passes: u64, units: u32| {
-            u32::try_from(passes).unwrap_or(u32::MAX).div_ceil(units.max(1))
+    /// Cycles in which every pass issues one entry.
+    #[must_use]
+    pub fn slot(&self, profile: &Profile, step: &StepShape) -> u64 {
+        let cycles = self.issues_per_entry(step) * u64::from(profile.initiation_interval);
+        cycles.div_ceil(profile.collisions_per_issue.into())
+    }
+
+    /// Cycles by which the last pass is behind the first, if the order needs all of the delay lines.
+    #[must_use]
+    pub fn behind(&self, profile: &Profile, step: &StepShape) -> u64 {
+        step.passes().saturating_sub(1) * u64::from(self.lag) * self.slot(profile, step)
+    }
+
+    /// DSPs, flip-flops and lookup tables, percent of the device, without places, scoreboard and
+    /// delay lines: an extrapolation from the thesis' design in the same arithmetic, which has one
+    /// unit of each kind.
+    #[must_use]
+    pub fn logic(&self, variant: &Variant) -> (&'static Design, [u32; 3]) {
+        let from = match variant.numbers.updates {
+            Precision::F32 => &FLOAT_DESIGN,
+            Precision::Binary16 => &HALF_DESIGN,
         };
-        of(contact_iterations, self.contact_units).max(of(friction_iterations, self.friction_units))
+        (from, [from.dsp, from.flip_flops, from.lookup_tables].map(|each| each * self.units))
     }
 }
 
@@ -207,4 +212,75 @@ pub fn words(variant: &Variant) -> RecordWords {
     #[expect(clippy::cast_possible_truncation, reason = "a record has few words")]
     let numbers = (collision_rows(variant.profile) * LANES) as u32;
     RecordWords { collision: numbers * bits / u32::BITS, ..variant.words() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::{MemoryUse, PortAccount, Records, StepCycles, StepTraffic};
+
+    /// By hand: (127,000 + 7 x 2,816) x 4 + 306, then the fill of the integration.
+    #[test]
+    fn the_formula_is_entries_and_lags_by_slots() {
+        let shape = StepShape::new(38_880, 127_000);
+        for (profile, slot) in [(&WINDOWED, 4), (&WINDOWED16, 3)] {
+            let design = Window::of(profile).expect("it has a window");
+            assert_eq!(design.slot(profile, &shape), slot);
+            assert_eq!(design.behind(profile, &shape), 7 * 2_816 * slot);
+            let step = StepCycles::new(&profile.default_variant(), Records::Streamed, &shape);
+            assert_eq!((step.load, step.integration()), (0, 0), "both are beside the passes");
+            assert_eq!(step.total, (127_000 + 7 * 2_816) * slot + 306 + 264);
+        }
+        assert_eq!(Window::of(&FLOAT), None);
+    }
+
+    /// 3 lines of 28 words, 4 of 24, 2,816 entries long, and 8,192 velocities.
+    #[test]
+    fn on_chip_are_seven_delay_lines_and_the_places() {
+        for (profile, bytes, most) in [(&WINDOWED, 4, 2.2), (&WINDOWED16, 2, 1.2)] {
+            let memory = MemoryUse::new(&profile.default_variant(), 38_880, 127_746);
+            let lines = 2_816 * (3 * 28 + 4 * 24) * bytes;
+            assert_eq!(memory.block_ram(), lines + 8_192 * 6 * bytes, "{}", profile.name);
+            let mib = memory.block_ram() as f64 / f64::from(1 << 20);
+            assert!(mib <= most, "{mib} MiB");
+            // The memory does not depend on the scene.
+            assert_eq!(memory, MemoryUse::new(&profile.default_variant(), 7, 7));
+            assert!(memory.fits());
+        }
+    }
+
+    #[test]
+    fn a_step_moves_a_sixth_and_an_eleventh_of_floats_bytes() {
+        let shape = StepShape::new(38_880, 127_746);
+        let bytes = |profile: &'static Profile| {
+            StepTraffic::new(&profile.default_variant(), Records::Streamed, &shape).bytes()
+        };
+        let float = bytes(&FLOAT);
+        assert!(6 * bytes(&WINDOWED) <= float, "{} of {float}", bytes(&WINDOWED));
+        assert!(11 * bytes(&WINDOWED16) <= float, "{} of {float}", bytes(&WINDOWED16));
+    }
+
+    /// A unit memory takes two reads and two writes of its own, and two writes from the unit before
+    /// it, on two ports of a pumped block RAM.
+    #[test]
+    fn the_ports_of_a_unit_memory_allow_the_interval() {
+        for (profile, accesses, interval) in [(&WINDOWED, 6, 2), (&WINDOWED16, 12, 3)] {
+            let account = PortAccount::new(&profile.default_variant());
+            let velocities = account.velocities();
+            assert_eq!((velocities.accesses(), velocities.interval()), (accesses, interval));
+            assert_eq!(account.smallest(), profile.initiation_interval);
+            // Without the pump it would take twice as long.
+            assert_eq!(velocities.with(1, 1).interval(), accesses / 2);
+        }
+    }
+
+    #[test]
+    fn two_units_of_a_kind_take_nearly_all_lookup_tables_and_three_do_not_fit() {
+        let logic =
+            |design: Window, profile: &'static Profile| design.logic(&profile.default_variant()).1;
+        assert_eq!(logic(TWO_OF_A_KIND, &WINDOWED), [84, 64, 94]);
+        assert_eq!(logic(TWO_OF_A_KIND, &WINDOWED16), [84, 58, 98]);
+        let three = Window { units: 3, ..TWO_OF_A_KIND };
+        assert!(logic(three, &WINDOWED).into_iter().any(|percent| percent > 100));
+    }
 }

@@ -16,16 +16,14 @@ pub mod thesis;
 mod time;
 mod traffic;
 mod warm;
-mod window;
 
 pub use blocks::{BLOCK_BITS, BLOCKS, BlockShape, ShapedBlocks};
 pub use cycles::StepCycles;
 pub use designs::{DESIGNS, MIXED, OnChipArray, WINDOWED, WINDOWED16, Window, words};
 pub use ports::{LoadPorts, PORTS, PortAccount, PortUse};
 pub use resources::{ArrayUse, MemoryUse};
-pub use schedule::{Access, AccessKind, Schedule, Slot};
+pub use schedule::{Access, AccessKind, Slot, schedule};
 pub use step::StepShape;
 pub use time::{PartLimit, PartTime, StepTime};
 pub use traffic::{HP_PORT_BITS, HP_PORTS, Records, StepTraffic, StreamDemand, Transfer};
 pub use warm::{WarmCost, WarmStart};
-pub use window::{WindowCycles, WindowLogic, WindowStep};

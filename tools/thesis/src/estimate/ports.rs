@@ -30,7 +30,7 @@
 
 use super::designs::{OnChipArray, Window};
 use super::step::StepShape;
-use super::traffic::{Records, StepTraffic};
+use super::traffic::{Records, StepTraffic, issues_of_an_entry};
 use pgs_interface::profile::{Inertia, Variant};
 
 /// Ports of a block RAM.
@@ -58,13 +58,13 @@ impl PortUse {
     #[must_use]
     pub fn accesses(&self) -> u32 {
         let reads = self.reads * self.collisions;
-        reads.div_ceil(self.copies.max(1)) + self.writes * self.collisions
+        reads.div_ceil(self.copies) + self.writes * self.collisions
     }
 
     /// Cycles that one issue occupies the ports of the busiest copy.
     #[must_use]
     pub fn interval(&self) -> u32 {
-        self.accesses().div_ceil(PORTS * self.pump.max(1)).max(1)
+        self.accesses().div_ceil(PORTS * self.pump).max(1)
     }
 
     /// Whether an issue reads no more than one row and writes no more than one: a port for each is
@@ -102,7 +102,7 @@ pub struct LoadPorts {
 /// The ports of a variant of a profile.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PortAccount {
-    /// Each array.
+    /// Each array, the velocities first.
     pub arrays: Vec<PortUse>,
     /// Interval that the streams allow: cycles of the busiest stream for one issue.
     pub by_streams: u32,
@@ -158,8 +158,8 @@ impl PortAccount {
 
     /// Use of the velocities' ports; they decide.
     #[must_use]
-    pub fn velocities(&self) -> Option<&PortUse> {
-        self.arrays.iter().find(|array| array.array == OnChipArray::Velocities)
+    pub fn velocities(&self) -> &PortUse {
+        &self.arrays[0]
     }
 
     /// The load of `bodies` bodies on the ports of each array of bodies.
@@ -171,7 +171,7 @@ impl PortAccount {
         let of_bodies = self.arrays.iter().filter(|ports| ports.array.is_of_bodies());
         of_bodies
             .map(|ports| {
-                let by_ports = bodies.div_ceil(u64::from(PORTS * ports.pump.max(1)));
+                let by_ports = bodies.div_ceil(u64::from(PORTS * ports.pump));
                 let banks = by_ports.div_ceil(by_streams.max(1)).max(1);
                 LoadPorts { array: ports.array, by_streams, by_ports, banks }
             })
@@ -183,14 +183,10 @@ impl PortAccount {
 /// passes run side by side, an entry is streamed once and issued several times.
 fn stream_interval(variant: &Variant) -> u32 {
     let profile = variant.profile;
-    let issues = u32::try_from(profile.stripes.collisions.streams.len()).unwrap_or(1).max(1);
-    let step = StepShape::new(0, u64::from(issues) * u64::from(profile.collisions_per_issue));
-    let traffic = StepTraffic::new(variant, Records::Streamed, &step);
-    let mut entries = u64::from(issues);
-    if let Some(design) = Window::of(profile) {
-        entries *= u64::from(design.issues_per_entry());
-    }
-    let interval = traffic.collisions.cycles.div_ceil(entries);
+    let issues = profile.stripes.collisions.streams.len() as u64;
+    let step = StepShape::new(0, issues * u64::from(profile.collisions_per_issue));
+    let cycles = StepTraffic::new(variant, Records::Streamed, &step).collisions.cycles;
+    let interval = cycles.div_ceil(issues * issues_of_an_entry(profile));
     u32::try_from(interval).unwrap_or(u32::MAX)
 }
 
@@ -227,7 +223,7 @@ mod tests {
     #[test]
     fn without_the_pump_no_number_of_copies_lets_mixed_issue_every_cycle() {
         let account = account(&MIXED);
-        let velocities = account.velocities().expect("they are on chip");
+        let velocities = account.velocities();
         for copies in 1..1000 {
             assert_eq!(velocities.with(copies, 1).interval(), 2, "{copies} copies");
         }
@@ -237,7 +233,7 @@ mod tests {
     #[test]
     fn two_copies_bring_half_from_four_to_three_and_no_lower() {
         let account = account(&HALF);
-        let velocities = account.velocities().expect("they are on chip");
+        let velocities = account.velocities();
         let interval = |copies| velocities.with(copies, 1).interval();
         assert_eq!([interval(1), interval(2), interval(3), interval(1000)], [4, 3, 3, 3]);
     }

@@ -3,10 +3,10 @@
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
 use super::blocks::{BLOCK_BITS, ShapedBlocks};
-use super::designs::OnChipArray;
-use super::designs::Window;
-use super::ports::PortAccount;
-use super::window;
+use super::designs::{OnChipArray, Window};
+use super::ports::{PortAccount, PortUse};
+use super::step::StepShape;
+use super::traffic::RELATIVE_NUMBERS;
 use pgs_interface::profile::Variant;
 
 /// Numbers of a velocity, and of a world inverse inertia.
@@ -36,13 +36,13 @@ impl ArrayUse {
     /// Bytes of all copies.
     #[must_use]
     pub const fn bytes(&self) -> u64 {
-        self.rows.saturating_mul((self.row_bytes * self.copies) as u64)
+        self.rows * (self.row_bytes * self.copies) as u64
     }
 
     /// Blocks of all copies if no bit of a block were lost.
     #[must_use]
     pub const fn ideal_blocks(&self) -> u64 {
-        self.bytes().saturating_mul(BITS_PER_BYTE as u64).div_ceil(BLOCK_BITS)
+        (self.bytes() * BITS_PER_BYTE as u64).div_ceil(BLOCK_BITS)
     }
 
     /// Blocks of all copies by the shapes of the block.
@@ -50,7 +50,7 @@ impl ArrayUse {
     pub fn shaped_blocks(&self) -> ShapedBlocks {
         let bits = u64::from(self.row_bytes * BITS_PER_BYTE);
         let one = ShapedBlocks::fewest(self.rows, bits, self.simple);
-        let blocks = one.blocks.saturating_mul(self.copies.into());
+        let blocks = one.blocks * u64::from(self.copies);
         ShapedBlocks { blocks, ..one }
     }
 }
@@ -71,35 +71,36 @@ impl MemoryUse {
     /// On-chip memory of `bodies` bodies and `collisions` collisions in a variant of a profile.
     #[must_use]
     pub fn new(variant: &Variant, bodies: u64, collisions: u64) -> Self {
-        let memory = variant.profile.memory;
+        let (profile, memory) = (variant.profile, variant.profile.memory);
         let number = variant.numbers.velocities.bytes();
-        let arrays = PortAccount::new(variant)
-            .arrays
-            .into_iter()
-            .map(|ports| {
-                let (rows, row_bytes) = match ports.array {
-                    OnChipArray::Velocities | OnChipArray::Inertia => (bodies, SIX * number),
-                    OnChipArray::Impulses => (collisions, FOUR * variant.numbers.impulses.bytes()),
-                    OnChipArray::ShapeIndices => (bodies, memory.shape_index_bytes),
-                    OnChipArray::ContactLines | OnChipArray::FrictionLines => (0, 0),
-                };
-                let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
-                let design = Window::of(variant.profile);
-                let of_window = design.and_then(|design| window::array(variant, design, array));
-                if let Some(of) = of_window {
-                    let (rows, row_bytes, copies) = (of.rows, of.row_bytes, of.memories);
-                    return ArrayUse { array, rows, row_bytes, copies, simple };
-                }
-                ArrayUse { array, rows, row_bytes, copies, simple }
-            })
-            .collect();
+        let impulses = FOUR * variant.numbers.impulses.bytes();
+        let window = Window::of(profile);
+        let line = |words| words * variant.numbers.collisions.bits() / BITS_PER_BYTE + impulses;
+        let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
+        let of_array = |ports: PortUse| {
+            let (row_bytes, lines) = match ports.array {
+                OnChipArray::Velocities | OnChipArray::Inertia => (SIX * number, 0),
+                OnChipArray::Impulses => (impulses, 0),
+                OnChipArray::ShapeIndices => (memory.shape_index_bytes, 0),
+                // A contact line lies between two contact passes; a friction line leads into each
+                // friction pass, without the four distances.
+                OnChipArray::ContactLines => (line(RELATIVE_NUMBERS), contact_iterations - 1),
+                OnChipArray::FrictionLines => (line(RELATIVE_NUMBERS - FOUR), friction_iterations),
+            };
+            let (rows, copies) = match (window, ports.array.is_of_bodies()) {
+                (None, true) => (bodies, ports.copies),
+                (None, false) => (collisions, ports.copies),
+                // A memory for each unit.
+                (Some(of), true) => ((of.slots / (2 * of.units)).into(), 2 * of.units),
+                (Some(of), false) => (of.lag.into(), u32::try_from(lines).unwrap_or(u32::MAX)),
+            };
+            ArrayUse { array: ports.array, rows, row_bytes, copies, simple: ports.simple() }
+        };
+        let arrays = PortAccount::new(variant).arrays.into_iter().map(of_array).collect();
         let position = THREE * number * memory.velocity_copies;
-        let bodies = Window::of(variant.profile).map_or(bodies, |design| design.slots.into());
-        Self {
-            arrays,
-            capacity: memory.bytes.into(),
-            positions: bodies.saturating_mul(position.into()),
-        }
+        let bodies = window.map_or(bodies, |design| design.slots.into());
+        let (capacity, positions) = (memory.bytes.into(), bodies * u64::from(position));
+        Self { arrays, capacity, positions }
     }
 
     /// Bytes of one array; 0 if it is not on chip.
@@ -109,7 +110,7 @@ impl MemoryUse {
     }
 
     fn sum(&self, of: impl Fn(&ArrayUse) -> u64) -> u64 {
-        self.arrays.iter().map(of).fold(0, u64::saturating_add)
+        self.arrays.iter().map(of).sum()
     }
 
     /// Bytes used of the block RAM that bodies and collisions share. The shape indices have a
@@ -122,13 +123,13 @@ impl MemoryUse {
     /// Block RAM used if the positions were on chip too, bytes (thesis §4.4.2).
     #[must_use]
     pub fn with_positions(&self) -> u64 {
-        self.block_ram().saturating_add(self.positions)
+        self.block_ram() + self.positions
     }
 
     /// Blocks used, shape indices included, if no bit of a block were lost.
     #[must_use]
     pub fn ideal_blocks(&self) -> u64 {
-        self.sum(ArrayUse::bytes).saturating_mul(BITS_PER_BYTE.into()).div_ceil(BLOCK_BITS)
+        (self.sum(ArrayUse::bytes) * u64::from(BITS_PER_BYTE)).div_ceil(BLOCK_BITS)
     }
 
     /// Blocks used, shape indices included, by the shapes that a block can take.
@@ -150,7 +151,7 @@ impl MemoryUse {
         if Window::of(variant.profile).is_some() {
             return Window::COLLISIONS_MAX.into();
         }
-        let taken = bodies.saturating_mul(variant.bytes_per_body().into());
+        let taken = bodies * u64::from(variant.bytes_per_body());
         let free = u64::from(variant.profile.memory.bytes).saturating_sub(taken);
         free / u64::from(variant.bytes_per_collision().max(1))
     }

@@ -25,7 +25,7 @@ pub struct Access {
     pub row: u32,
 }
 
-/// A port in one clock of the memory.
+/// Both ports of a copy in one clock of the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slot {
     /// Cycle of the accelerator, from the start of the interval.
@@ -34,19 +34,8 @@ pub struct Slot {
     pub phase: u32,
     /// Copy of the array.
     pub copy: u32,
-    /// Port of that copy.
-    pub port: u32,
-    /// The access on the port, if any.
-    pub access: Option<Access>,
-}
-
-/// Accesses of one issue on the ports of an array.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Schedule {
-    /// Cycles of the accelerator.
-    pub interval: u32,
-    /// Every slot, by cycle, phase, copy and port.
-    pub slots: Vec<Slot>,
+    /// The access on each port, if any.
+    pub ports: [Option<Access>; PORTS as usize],
 }
 
 /// Rows that the collisions of an issue access, in order.
@@ -55,30 +44,23 @@ fn accesses(kind: AccessKind, collisions: u32, rows: u32) -> impl Iterator<Item 
         .flat_map(move |collision| (0..rows).map(move |row| Access { kind, collision, row }))
 }
 
-impl Schedule {
-    /// Reads first, one after the other to the next copy, then all writes to every copy.
-    pub(crate) fn new(ports: &PortUse) -> Self {
-        let (copies, pump) = (ports.copies.max(1), ports.pump.max(1));
-        let queue = |copy: u32| {
-            let reads = accesses(AccessKind::Read, ports.collisions, ports.reads)
-                .skip(copy as usize)
-                .step_by(copies as usize);
-            reads.chain(accesses(AccessKind::Write, ports.collisions, ports.writes))
-        };
-        let mut queues: Vec<_> = (0..copies).map(queue).collect();
-        let interval = ports.interval();
-        let mut slots = Vec::new();
-        for cycle in 0..interval {
-            for phase in 0..pump {
-                for (copy, queue) in (0..).zip(&mut queues) {
-                    for port in 0..PORTS {
-                        slots.push(Slot { cycle, phase, copy, port, access: queue.next() });
-                    }
-                }
+/// The accesses of one issue on the ports of an array, copy by copy: reads first, one after the
+/// other to the next copy, then all writes to every copy.
+#[must_use]
+pub fn schedule(ports: &PortUse) -> Vec<Slot> {
+    let mut slots = Vec::new();
+    for copy in 0..ports.copies {
+        let reads = accesses(AccessKind::Read, ports.collisions, ports.reads);
+        let writes = accesses(AccessKind::Write, ports.collisions, ports.writes);
+        let mut queue = reads.skip(copy as usize).step_by(ports.copies as usize).chain(writes);
+        for cycle in 0..ports.interval() {
+            for phase in 0..ports.pump {
+                let ports = [(); PORTS as usize].map(|()| queue.next());
+                slots.push(Slot { cycle, phase, copy, ports });
             }
         }
-        Self { interval, slots }
     }
+    slots
 }
 
 #[cfg(test)]
@@ -94,31 +76,34 @@ mod tests {
         for profile in DESIGNS {
             let variant = Variant { inertia: Inertia::World, ..profile.default_variant() };
             for ports in PortAccount::new(&variant).arrays {
-                let schedule = Schedule::new(&ports);
-                assert!(schedule.interval <= profile.initiation_interval);
-                let places = |kind, collision, row| {
-                    let access = Some(Access { kind, collision, row });
-                    schedule.slots.iter().filter(|slot| slot.access == access).collect::<Vec<_>>()
-                };
+                let slots = schedule(&ports);
+                let found: Vec<(u32, Access)> = slots
+                    .iter()
+                    .flat_map(|slot| slot.ports.into_iter().flatten().map(|it| (slot.copy, it)))
+                    .collect();
                 for collision in 0..ports.collisions {
+                    let copies = |kind, row| -> Vec<u32> {
+                        let access = Access { kind, collision, row };
+                        found
+                            .iter()
+                            .filter(|(_, it)| *it == access)
+                            .map(|(copy, _)| *copy)
+                            .collect()
+                    };
                     for row in 0..ports.reads {
-                        let reads = places(AccessKind::Read, collision, row);
-                        assert_eq!(reads.len(), 1, "{ports:?}");
+                        assert_eq!(copies(AccessKind::Read, row).len(), 1, "{ports:?}");
                     }
                     for row in 0..ports.writes {
-                        let writes = places(AccessKind::Write, collision, row);
-                        let mut copies: Vec<u32> = writes.iter().map(|slot| slot.copy).collect();
-                        copies.sort_unstable();
-                        assert_eq!(copies, (0..ports.copies).collect::<Vec<_>>(), "{ports:?}");
+                        let all: Vec<_> = (0..ports.copies).collect();
+                        assert_eq!(copies(AccessKind::Write, row), all, "{ports:?}");
                     }
                 }
-                let used = schedule.slots.iter().filter(|slot| slot.access.is_some()).count();
                 let rows = ports.reads + ports.copies * ports.writes;
-                assert_eq!(used, (ports.collisions * rows) as usize, "{ports:?}");
-                for (k, slot) in schedule.slots.iter().enumerate() {
-                    let place = |s: &Slot| (s.cycle, s.phase, s.copy, s.port);
-                    assert!(slot.cycle < schedule.interval && slot.phase < ports.pump);
-                    assert!(schedule.slots[..k].iter().all(|other| place(other) != place(slot)));
+                assert_eq!(found.len(), (ports.collisions * rows) as usize, "{ports:?}");
+                for (k, slot) in slots.iter().enumerate() {
+                    let place = |s: &Slot| (s.cycle, s.phase, s.copy);
+                    assert!(slot.cycle < profile.initiation_interval && slot.phase < ports.pump);
+                    assert!(slots[..k].iter().all(|other| place(other) != place(slot)));
                 }
             }
         }
@@ -133,15 +118,11 @@ mod tests {
                 let account = PortAccount::new(&Variant { inertia, ..profile.default_variant() });
                 for ports in account.arrays.into_iter().filter(PortUse::simple) {
                     simple += 1;
-                    let schedule = Schedule::new(&ports);
-                    for kind in [AccessKind::Read, AccessKind::Write] {
-                        let of_kind = |slot: &&Slot| slot.access.is_some_and(|a| a.kind == kind);
-                        let moment = |slot: &Slot| (slot.cycle, slot.phase, slot.copy);
-                        let mut moments: Vec<_> =
-                            schedule.slots.iter().filter(of_kind).map(moment).collect();
-                        let accesses = moments.len();
-                        moments.dedup();
-                        assert_eq!(moments.len(), accesses, "{} {ports:?}", profile.name);
+                    for slot in schedule(&ports) {
+                        for kind in [AccessKind::Read, AccessKind::Write] {
+                            let of_kind = slot.ports.iter().flatten().filter(|it| it.kind == kind);
+                            assert!(of_kind.count() <= 1, "{} {ports:?}", profile.name);
+                        }
                     }
                 }
             }
@@ -153,13 +134,14 @@ mod tests {
     #[test]
     fn half_reads_body_a_from_one_copy_and_body_b_from_the_other() {
         let account = PortAccount::new(&HALF.default_variant());
-        let schedule = Schedule::new(account.velocities().expect("they are on chip"));
-        for slot in &schedule.slots {
-            match slot.access {
-                Some(Access { kind: AccessKind::Read, row, .. }) => {
-                    assert_eq!((slot.copy, slot.cycle), (row, 0));
+        for slot in schedule(account.velocities()) {
+            for access in slot.ports {
+                match access {
+                    Some(Access { kind: AccessKind::Read, row, .. }) => {
+                        assert_eq!((slot.copy, slot.cycle), (row, 0));
+                    }
+                    access => assert!(access.is_some(), "no port of the three cycles is idle"),
                 }
-                access => assert!(access.is_some(), "no port of the three cycles is idle"),
             }
         }
     }

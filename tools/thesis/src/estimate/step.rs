@@ -29,10 +29,6 @@ impl StepShape {
     /// Passes over the collisions; 0 without collisions.
     #[must_use]
     pub const fn passes(&self) -> u64 {
-        if self.collisions == 0 {
-            0
-        } else {
-            self.contact_iterations.saturating_add(self.friction_iterations)
-        }
+        if self.collisions == 0 { 0 } else { self.contact_iterations + self.friction_iterations }
     }
 }

@@ -53,8 +53,6 @@ pub struct StepTime {
     pub load: PartTime,
     /// One pass over the collisions, without fill.
     pub pass: PartTime,
-    /// Fill of all passes together and of the integration, s.
-    pub fill_seconds: f64,
     /// Poses in and results out.
     pub integration: PartTime,
     /// The whole step, s.
@@ -87,20 +85,21 @@ impl StepTime {
                 PartTime { seconds: compute, bytes, limit: own }
             }
         };
-        let last = traffic.poses.bytes.saturating_add(traffic.results.bytes);
-        let beside = Window::of(variant.profile).is_some();
-        let (first, each, last) = if beside {
-            (0, traffic.bytes(), 0)
-        } else {
-            (traffic.velocities.bytes, traffic.collisions.bytes, last)
+        let (first, each, last) = match Window::of(variant.profile) {
+            Some(_) => (0, traffic.bytes(), 0),
+            None => (
+                traffic.velocities.bytes,
+                traffic.collisions.bytes,
+                traffic.poses.bytes + traffic.results.bytes,
+            ),
         };
         let load = part(cycles.load, first, PartLimit::Streams);
         let pass = part(cycles.pass, each, interval_limit(variant));
         let integration = part(cycles.integration(), last, PartLimit::Streams);
-        let fill_seconds = cycles.fill.saturating_add(cycles.integration_fill) as f64 / clock_hz;
+        let fill_seconds = (cycles.fill + cycles.integration_fill) as f64 / clock_hz;
         let passes = traffic.collision_streams as f64 * pass.seconds;
         let seconds = load.seconds + passes + fill_seconds + integration.seconds;
-        Self { load, pass, fill_seconds, integration, seconds, bytes: traffic.bytes() }
+        Self { load, pass, integration, seconds, bytes: traffic.bytes() }
     }
 
     /// The step in clock cycles of the accelerator, waits for the memory included.

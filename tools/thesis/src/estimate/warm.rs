@@ -4,7 +4,7 @@ use super::cycles::StepCycles;
 use super::designs;
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic, Transfer};
-use pgs_interface::profile::{Depth, Variant};
+use pgs_interface::profile::Variant;
 use pgs_interface::record::BEAT_BYTES;
 
 /// The way in which a step applies the impulses that it begins with.
@@ -18,8 +18,7 @@ pub enum WarmStart {
     FirstPass,
 }
 
-/// Cycles and bytes of a step without and with a warm start, by formula. Counts beyond 64 bits
-/// saturate.
+/// Cycles and bytes of a step without and with a warm start, by formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WarmCost {
     /// Cycles of the step without it.
@@ -46,33 +45,29 @@ impl WarmCost {
                 (profile.collisions_per_issue, designs::warm_collision_rows(profile));
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
-        let kinds = [
+        let together = u64::from(profile.collisions_per_issue);
+        let issues = step.collisions.div_ceil(together);
+        let usual = u64::from(profile.initiation_interval);
+        let interval = records(together).cycles.max(usual);
+        let traffic = StepTraffic::new(variant, Records::Streamed, step);
+        let bytes = records(step.collisions).bytes;
+        let (mut more_cycles, mut more_in, mut more_out) = (0, 0, 0);
+        for (count, kind) in [
             (step.contact_iterations, variant.contact()),
             (step.friction_iterations, variant.friction()),
-        ];
-        let kinds = kinds.into_iter().filter(|(count, _)| *count > 0 && step.collisions > 0);
-        let issues = step.collisions.div_ceil(u64::from(profile.collisions_per_issue).max(1));
-        let per_issue = records(u64::from(profile.collisions_per_issue)).cycles;
-        let interval = per_issue.max(profile.initiation_interval.into());
-        let traffic = StepTraffic::new(variant, Records::Streamed, step);
-        let impulses = step.collisions.saturating_mul(BEAT_BYTES as u64);
-        let (mut more_cycles, mut more_in, mut more_out) = (0_u64, 0_u64, 0_u64);
-        for (_, Depth { fill, .. }) in kinds {
+        ] {
+            if count == 0 || step.collisions == 0 {
+                continue;
+            }
             let (cycles, bytes) = match way {
-                WarmStart::OwnPass => {
-                    let pass = issues.saturating_mul(interval).saturating_add(fill.into());
-                    (pass, records(step.collisions).bytes)
-                }
+                WarmStart::OwnPass => (issues * interval + u64::from(kind.fill), bytes),
                 WarmStart::FirstPass => {
-                    let longer = interval.saturating_sub(profile.initiation_interval.into());
-                    let usual = traffic.collisions.bytes;
-                    let longer_records = records(step.collisions).bytes.saturating_sub(usual);
-                    (issues.saturating_mul(longer), longer_records)
+                    (issues * (interval - usual), bytes - traffic.collisions.bytes)
                 }
             };
-            more_cycles = more_cycles.saturating_add(cycles);
-            more_in = more_in.saturating_add(bytes);
-            more_out = more_out.saturating_add(impulses);
+            more_cycles += cycles;
+            more_in += bytes;
+            more_out += step.collisions * BEAT_BYTES as u64;
         }
         let cycles = StepCycles::new(variant, Records::Streamed, step).total;
         Some(Self { cycles, more_cycles, bytes: traffic.bytes(), more_in, more_out })

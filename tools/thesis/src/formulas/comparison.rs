@@ -16,46 +16,39 @@ use pgs_interface::profile::Variant;
 
 use super::scene::{Scene, difference};
 use crate::table::{Cell, Kind, Table, text};
+use Source::{Latency, Powers};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![platforms(), against(scene)]
 }
 
 fn platforms() -> Table {
-    let mut table = Table::with_columns(
-        "platforms",
-        "The thesis' records of GPU, CPU and board (T6.5, T6.9)",
-        &[
-            ("platform", "platform"),
-            ("ms", "ms"),
-            ("watts", "W"),
-            ("joules", "J"),
-            ("recomputed_joules", "J from ms and W"),
-            ("difference_percent", "difference"),
-            ("kind", "kind"),
-        ],
-    );
-    for platform in [GPU, CPU] {
-        let joules = platform.watts * platform.latency_ms / 1e3;
+    let title = "The thesis' records of GPU, CPU and board (T6.5, T6.9)";
+    let mut table = Table::new("platforms", title);
+    for (name, watts, other) in [
+        (GPU.name, GPU.watts, Some(GPU)),
+        (CPU.name, CPU.watts, Some(CPU)),
+        ("ZCU102", ZCU102_WATTS, None),
+    ] {
+        let joules = other.map(|other| (watts * other.latency_ms / 1e3, other.joules));
         table.row([
-            text(platform.name),
-            Cell::Number(platform.latency_ms, 2),
-            Cell::Number(platform.watts, 0),
-            Cell::Number(platform.joules, 2),
-            Cell::Number(joules, 3),
-            difference(joules, platform.joules),
-            Kind::Recorded.cell(),
+            ("platform", "platform", text(name)),
+            ("ms", "ms", Cell::known(other, |other| Cell::Number(other.latency_ms, 2))),
+            ("watts", "W", Cell::Number(watts, 0)),
+            ("joules", "J", Cell::known(joules, |(_, printed)| Cell::Number(printed, 2))),
+            (
+                "recomputed_joules",
+                "J from ms and W",
+                Cell::known(joules, |(found, _)| Cell::Number(found, 3)),
+            ),
+            (
+                "difference_percent",
+                "difference",
+                Cell::known(joules, |(found, printed)| difference(found, printed)),
+            ),
+            ("kind", "kind", Kind::Recorded.cell()),
         ]);
     }
-    table.row([
-        text("ZCU102"),
-        Cell::Missing,
-        Cell::Number(ZCU102_WATTS, 0),
-        Cell::Missing,
-        Cell::Missing,
-        Cell::Missing,
-        Kind::Recorded.cell(),
-    ]);
     table.note(format!(
         "T6.2 and T6.3 give thermal design powers of {} and {} W for the same GPU and CPU; the 15 \
          W of the board are its maximum, not measured.",
@@ -64,108 +57,101 @@ fn platforms() -> Table {
     table
 }
 
-/// The figures that follow from one latency.
-struct Outcome {
-    ms: f64,
-}
-
-impl Outcome {
-    fn joules(&self) -> f64 {
-        ZCU102_WATTS * self.ms / 1e3
-    }
-    fn speedup(&self, platform: &Platform) -> f64 {
-        platform.latency_ms / self.ms
-    }
-    /// Computes with both energies unrounded, not with the printed ones.
-    fn energy(&self, platform: &Platform) -> f64 {
-        self.energy_at(platform.watts, platform)
-    }
-    /// The same with another power of the platform, W.
-    fn energy_at(&self, watts: f64, platform: &Platform) -> f64 {
-        watts * platform.latency_ms / 1e3 / self.joules()
-    }
-    fn whole_step(&self) -> f64 {
-        amdahl(ACCELERATED_SHARE, self.speedup(&GPU))
-    }
-}
-
-use Source::{Latency, Powers};
-
-/// A figure of the thesis' comparison.
+/// A figure of the thesis' comparison, over GPU and CPU or alone.
 struct Figure {
+    /// Its name; `{}` stands for the platform's.
+    name: &'static str,
     /// The thesis' table.
     table: fn(&Design) -> &'static str,
-    name: String,
-    /// The printed figure, if there is one.
-    printed: fn(&Design) -> Option<f64>,
-    /// How to compute the figure: from a latency, or from the thesis' powers alone.
+    /// The printed figures, if there are some: over GPU and CPU, or twice the one.
+    printed: fn(&Design) -> Option<[f64; 2]>,
+    /// The formula: from a time in ms, or from the thesis' powers alone.
     of: Source,
 }
 
+type Formula = fn(f64, &Platform) -> f64;
+
 enum Source {
-    Latency(fn(&Outcome) -> f64),
-    Powers(f64),
+    Latency(Formula),
+    Powers(fn(&Platform) -> f64),
+}
+
+fn joules(ms: f64) -> f64 {
+    ZCU102_WATTS * ms / 1e3
+}
+
+fn speedup(ms: f64, platform: &Platform) -> f64 {
+    platform.latency_ms / ms
+}
+
+/// Computes with both energies unrounded, not with the printed ones.
+fn energy(ms: f64, platform: &Platform) -> f64 {
+    platform.watts * platform.latency_ms / 1e3 / joules(ms)
 }
 
 /// The figures in the order of the thesis' tables of latency, speed-up and efficiency.
-fn all_figures() -> Vec<Figure> {
-    type Table = fn(&Design) -> &'static str;
-    type Printed = fn(&Design) -> Option<f64>;
-    let mut all = Vec::new();
-    let mut add = |table: Table, name: &str, printed: Printed, of| {
-        all.push(Figure { table, name: name.to_owned(), printed, of });
-    };
-    let latency: Table = |design| design.comparison;
-    add(latency, "latency, ms", |it| Some(it.latency_ms), Latency(|it| it.ms));
-    add(latency, "energy at 15 W, J", |it| Some(it.joules), Latency(Outcome::joules));
-    let speedups: Table = |design| design.speedups;
-    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("speed-up over {}", platform.name));
-    add(speedups, &gpu, |it| Some(it.speedup.gpu), Latency(|it| it.speedup(&GPU)));
-    add(speedups, &cpu, |it| Some(it.speedup.cpu), Latency(|it| it.speedup(&CPU)));
-    let efficiencies: Table = |design| design.efficiencies;
-    let power: [Printed; 2] = [|it| Some(it.power.gpu), |it| Some(it.power.cpu)];
-    for (platform, printed) in [GPU, CPU].into_iter().zip(power) {
-        let name = format!("power efficiency over {}", platform.name);
-        add(efficiencies, &name, printed, Powers(platform.watts / ZCU102_WATTS));
-    }
-    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("energy efficiency over {}", platform.name));
-    add(efficiencies, &gpu, |it| Some(it.energy.gpu), Latency(|it| it.energy(&GPU)));
-    add(efficiencies, &cpu, |it| Some(it.energy.cpu), Latency(|it| it.energy(&CPU)));
-    for platform in [GPU, CPU] {
-        let name = format!("power efficiency, {} TDP", platform.name);
-        add(efficiencies, &name, |_| None, Powers(platform.design_watts / ZCU102_WATTS));
-    }
-    let [gpu, cpu] = [GPU, CPU].map(|platform| format!("energy efficiency, {} TDP", platform.name));
-    let of_gpu = Latency(|it| it.energy_at(GPU.design_watts, &GPU));
-    let of_cpu = Latency(|it| it.energy_at(CPU.design_watts, &CPU));
-    add(efficiencies, &gpu, |_| None, of_gpu);
-    add(efficiencies, &cpu, |_| None, of_cpu);
-    let whole: Printed = |it| Some(it.whole_step);
-    add(|_| "eq 6.5", "whole step over GTX 980's", whole, Latency(Outcome::whole_step));
-    all
-}
+const FIGURES: [Figure; 8] = [
+    Figure {
+        name: "latency, ms",
+        table: |design| design.comparison,
+        printed: |design| Some([design.latency_ms; 2]),
+        of: Latency(|ms, _| ms),
+    },
+    Figure {
+        name: "energy at 15 W, J",
+        table: |design| design.comparison,
+        printed: |design| Some([design.joules; 2]),
+        of: Latency(|ms, _| joules(ms)),
+    },
+    Figure {
+        name: "speed-up over {}",
+        table: |design| design.speedups,
+        printed: |design| Some(design.speedup),
+        of: Latency(speedup),
+    },
+    Figure {
+        name: "power efficiency over {}",
+        table: |design| design.efficiencies,
+        printed: |design| Some(design.power),
+        of: Powers(|platform| platform.watts / ZCU102_WATTS),
+    },
+    Figure {
+        name: "energy efficiency over {}",
+        table: |design| design.efficiencies,
+        printed: |design| Some(design.energy),
+        of: Latency(energy),
+    },
+    Figure {
+        name: "power efficiency, {} TDP",
+        table: |design| design.efficiencies,
+        printed: |_| None,
+        of: Powers(|platform| platform.design_watts / ZCU102_WATTS),
+    },
+    Figure {
+        name: "energy efficiency, {} TDP",
+        table: |design| design.efficiencies,
+        printed: |_| None,
+        of: Latency(|ms, it| energy(ms, &Platform { watts: it.design_watts, ..*it })),
+    },
+    Figure {
+        name: "whole step over GTX 980's",
+        table: |_| "eq 6.5",
+        printed: |design| Some([design.whole_step; 2]),
+        of: Latency(|ms, _| amdahl(ACCELERATED_SHARE, speedup(ms, &GPU))),
+    },
+];
 
 fn against(scene: &Scene) -> Table {
-    let mut table = Table::with_columns(
+    let mut table = Table::new(
         "comparison",
         "Against the thesis' GPU and CPU (T6.5 to T6.7, T6.9 to T6.11, equation 6.5)",
-        &[
-            ("profile", "profile"),
-            ("table", "table"),
-            ("figure", "figure"),
-            ("thesis", "thesis"),
-            ("recomputed", "recomputed"),
-            ("packed_unlimited", "ours"),
-            ("difference_percent", "diff."),
-            ("streamed_unlimited", "streamed"),
-            ("streamed_peak", "17.07 GB/s"),
-            ("streamed_sustained", "12.8 GB/s"),
-            ("kind", "kind"),
-        ],
     );
     for variant in &scene.variants {
-        for figure in &all_figures() {
-            add(&mut table, scene, variant, figure);
+        for figure in &FIGURES {
+            let platforms = if figure.name.contains("{}") { 2 } else { 1 };
+            for (k, platform) in [GPU, CPU].iter().enumerate().take(platforms) {
+                add(&mut table, scene, variant, figure, (k, platform));
+            }
         }
     }
     table.note(
@@ -188,53 +174,53 @@ fn against(scene: &Scene) -> Table {
     table
 }
 
-fn add(table: &mut Table, scene: &Scene, variant: &Variant, figure: &Figure) {
+fn add(
+    table: &mut Table,
+    scene: &Scene,
+    variant: &Variant,
+    figure: &Figure,
+    (k, platform): (usize, &Platform),
+) {
     let design = Design::of(variant.profile);
-    let number = |value| Cell::Number(value, 2);
-    let printed = design.and_then(figure.printed);
-    let (recomputed, ours, kind) = match figure.of {
-        Source::Powers(found) => {
-            // Every figure of the row is the thesis'.
-            if design.is_none() {
-                return;
-            }
-            (Some(found), None, Kind::Recorded)
+    let printed = design.and_then(figure.printed).map(|both| both[k]);
+    let (recomputed, ours, off, kind) = match figure.of {
+        // Every figure of the row is the thesis'.
+        Source::Powers(_) if design.is_none() => return,
+        Source::Powers(of) => {
+            let found = of(platform);
+            let off = Cell::known(printed, |printed| difference(found, printed));
+            (Some(found), [None; 4], off, Kind::Recorded)
         }
         Source::Latency(of) => {
-            let ms = |design: &Design| design.cycles as f64 / f64::from(design.profile.clock_khz);
-            let recomputed = design.map(|design| of(&Outcome { ms: ms(design) }));
-            let ours = |records, bandwidth| {
+            let thesis = design.map(|it| it.cycles as f64 / f64::from(it.profile.clock_khz));
+            let ours = [
+                (Records::Packed, Bandwidth::Unlimited),
+                (Records::Streamed, Bandwidth::Unlimited),
+                (Records::Streamed, Bandwidth::ZCU102_PEAK),
+                (Records::Streamed, Bandwidth::ZCU102_SUSTAINED),
+            ]
+            .map(|(records, bandwidth)| {
                 let time = StepTime::new(variant, records, &scene.step, bandwidth);
-                of(&Outcome { ms: time.seconds * 1e3 })
-            };
-            let all = [
-                ours(Records::Packed, Bandwidth::Unlimited),
-                ours(Records::Streamed, Bandwidth::Unlimited),
-                ours(Records::Streamed, Bandwidth::ZCU102_PEAK),
-                ours(Records::Streamed, Bandwidth::ZCU102_SUSTAINED),
-            ];
-            (recomputed, Some(all), Kind::Modelled)
+                of(time.seconds * 1e3, platform)
+            });
+            let off = Cell::known(printed, |printed| scene.difference(ours[0], printed));
+            (thesis.map(|ms| of(ms, platform)), ours.map(Some), off, Kind::Modelled)
         }
     };
-    let off = match (printed, ours, recomputed) {
-        (Some(printed), Some([packed, ..]), _) => scene.difference(packed, printed),
-        (Some(printed), None, Some(recomputed)) => difference(recomputed, printed),
-        _ => Cell::Missing,
-    };
-    let [packed, unlimited, peak, sustained] =
-        ours.map_or([const { Cell::Missing }; 4], |ours| ours.map(number));
+    let number = |value| Cell::known(value, |value| Cell::Number(value, 2));
+    let [packed, unlimited, peak, sustained] = ours.map(number);
     table.row([
-        text(variant.profile.name),
-        text(design.map_or("-", figure.table)),
-        text(&figure.name),
-        Cell::known(printed, number),
-        Cell::known(recomputed, number),
-        packed,
-        off,
-        unlimited,
-        peak,
-        sustained,
-        kind.cell(),
+        ("profile", "profile", text(variant.profile.name)),
+        ("table", "table", text(design.map_or("-", figure.table))),
+        ("figure", "figure", text(figure.name.replace("{}", platform.name))),
+        ("thesis", "thesis", number(printed)),
+        ("recomputed", "recomputed", number(recomputed)),
+        ("packed_unlimited", "ours", packed),
+        ("difference_percent", "diff.", off),
+        ("streamed_unlimited", "streamed", unlimited),
+        ("streamed_peak", "17.07 GB/s", peak),
+        ("streamed_sustained", "12.8 GB/s", sustained),
+        ("kind", "kind", kind.cell()),
     ]);
 }
 
@@ -249,8 +235,8 @@ pub(super) fn figures(part: &mut Part) {
     let (figure, row) = over_both(
         ("figure-6-1", "§6.5, Figure 6.1"),
         ["speed-up", "Speed-up of each design over GPU and CPU", caption],
-        |design| [design.speedup.gpu, design.speedup.cpu],
-        Outcome::speedup,
+        |design| design.speedup,
+        speedup,
     );
     part.figure(figure, [row]);
     let caption = "Powers are the thesis': 288 W, 133 W, and 15 W for the board, its maximum and \
@@ -259,8 +245,8 @@ pub(super) fn figures(part: &mut Part) {
     let (figure, row) = over_both(
         ("figure-6-2", "§6.5, Figure 6.2"),
         ["energy efficiency", "Energy efficiency of each design over GPU and CPU", caption],
-        |design| [design.energy.gpu, design.energy.cpu],
-        Outcome::energy,
+        |design| design.energy,
+        energy,
     );
     part.figure(figure, [row]);
 }
@@ -271,7 +257,7 @@ fn over_both(
     id: (&'static str, &'static str),
     [what, title, caption]: [&str; 3],
     recorded: fn(&Design) -> [f64; 2],
-    ours: fn(&Outcome, &Platform) -> f64,
+    ours: Formula,
 ) -> (Chart, Row) {
     let names = ["GPU, recorded", "GPU, modelled", "CPU, recorded", "CPU, modelled"];
     let (mut groups, mut values) = (Vec::new(), Vec::new());
@@ -279,8 +265,7 @@ fn over_both(
     for profile in ALL {
         let variant = profile.default_variant();
         let time = StepTime::new(&variant, Records::Packed, &thesis::step(), Bandwidth::Unlimited);
-        let outcome = Outcome { ms: time.seconds * 1e3 };
-        let [gpu, cpu] = [&GPU, &CPU].map(|platform| ours(&outcome, platform));
+        let [gpu, cpu] = [&GPU, &CPU].map(|platform| ours(time.seconds * 1e3, platform));
         let of_thesis = Design::of(profile).map(recorded);
         let [of_gpu, of_cpu] = [0, 1].map(|of| of_thesis.map(|both| both[of]));
         groups.push(profile.name.to_owned());
@@ -310,9 +295,8 @@ mod tests {
             let variant = design.profile.default_variant();
             let time =
                 StepTime::new(&variant, Records::Packed, &thesis::step(), Bandwidth::Unlimited);
-            let outcome = Outcome { ms: time.seconds * 1e3 };
-            for (platform, printed) in [(&GPU, design.speedup.gpu), (&CPU, design.speedup.cpu)] {
-                let ours = outcome.speedup(platform);
+            for (platform, printed) in [(&GPU, design.speedup[0]), (&CPU, design.speedup[1])] {
+                let ours = speedup(time.seconds * 1e3, platform);
                 assert!((ours / printed - 1.0).abs() < 0.02, "{printed} and {ours}");
             }
         }

@@ -3,7 +3,7 @@
 use crate::estimate::thesis::data::{DataTable, TABLES};
 use crate::estimate::{Records, StepTraffic, words};
 
-use super::scene::{Scene, mib, printed_mib};
+use super::scene::{Scene, mib, printed_mib, whole};
 use crate::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
@@ -28,28 +28,27 @@ fn accounted(scene: &Scene, data: &DataTable) -> Table {
     );
     let (bodies, collisions) = (scene.step.bodies, scene.step.collisions);
     for row in data.rows {
-        let (words, printed) = (row.words(bodies, collisions), row.printed);
-        let (bytes, beats) = (row.bytes(bodies, collisions), row.beats(bodies, collisions));
-        let thesis_mib = printed.centi_mebibytes as f64 / 100.0;
+        let (words, bytes) = (row.words(bodies, collisions), row.bytes(bodies, collisions));
+        let beats = row.beats(bodies, collisions);
+        let (each, theirs) = (row.each, row.centi_mebibytes as f64 / 100.0);
+        let [_, words_off] = scene.beside(words as f64, Some(row.total as f64), 0);
+        let [thesis_mib, mib_off] = scene.beside(printed_mib(bytes), Some(theirs), 2);
+        let [_, beats_off] = scene.beside(beats as f64, Some(row.accesses as f64), 0);
         table.row([
             ("state", "", text(row.name)),
-            ("each", "each", Cell::Whole(printed.each.into())),
-            ("each_bytes", "B", Cell::Whole(u64::from(printed.each) * 4)),
-            ("each_beats", "beats", Cell::Number(f64::from(printed.each) / 4.0, 2)),
+            ("each", "each", whole(each)),
+            ("each_bytes", "B", whole(each * 4)),
+            ("each_beats", "beats", Cell::Number(f64::from(each) / 4.0, 2)),
             ("formula", "in total", text(formula(row.per_collision, row.per_body))),
-            ("words", "words", Cell::Whole(words)),
-            ("thesis_words", "thesis", Cell::Whole(printed.words)),
-            ("difference_percent", "diff.", scene.difference(words as f64, printed.words as f64)),
+            ("words", "words", whole(words)),
+            ("thesis_words", "thesis", whole(row.total)),
+            ("difference_percent", "diff.", words_off),
             ("mib", "MiB", Cell::Number(mib(bytes), 2)),
-            ("thesis_mib", "thesis", Cell::Number(thesis_mib, 2)),
-            ("mib_difference_percent", "diff.", scene.difference(printed_mib(bytes), thesis_mib)),
-            ("beats", "beats", Cell::Whole(beats)),
-            ("thesis_beats", "thesis", Cell::Whole(printed.beats)),
-            (
-                "beats_difference_percent",
-                "diff.",
-                scene.difference(beats as f64, printed.beats as f64),
-            ),
+            ("thesis_mib", "thesis", thesis_mib),
+            ("mib_difference_percent", "diff.", mib_off),
+            ("beats", "beats", whole(beats)),
+            ("thesis_beats", "thesis", whole(row.accesses)),
+            ("beats_difference_percent", "diff.", beats_off),
             ("kind", "kind", Kind::Exact.cell()),
         ]);
     }
@@ -60,35 +59,28 @@ fn accounted(scene: &Scene, data: &DataTable) -> Table {
 }
 
 fn streamed(scene: &Scene) -> Table {
-    let mut table = Table::new(
-        "records",
-        "The same as streamed, collisions once: 32-bit words with padding, beside T4.5 and T4.6",
-    );
-    let (input, output) = (TABLES[4].rows[1].printed.words, TABLES[5].rows[1].printed.words);
-    for variant in &scene.variants {
-        let words = words(variant);
+    let title =
+        "The same as streamed, collisions once: 32-bit words with padding, beside T4.5 and T4.6";
+    let (input, output) = (TABLES[4].rows[1].total, TABLES[5].rows[1].total);
+    scene.table("records", title, Kind::Exact, |variant| {
+        let each = words(variant);
         let traffic = StepTraffic::new(variant, Records::Streamed, &scene.step);
         let arrays = [traffic.velocities, traffic.collisions, traffic.poses];
-        let bytes = arrays.iter().fold(0_u64, |sum, array| sum.saturating_add(array.bytes));
-        let (ours, results) = (bytes / 4, traffic.results.bytes / 4);
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("velocity", "velocity", Cell::Whole(words.velocity.into())),
-            ("collision", "collision", Cell::Whole(words.collision.into())),
-            ("pose", "pose", Cell::Whole(words.pose.into())),
-            ("result", "result", Cell::Whole(words.result.into())),
-            ("input", "words in", Cell::Whole(ours)),
-            ("thesis_input", "thesis", Cell::Whole(input)),
-            ("input_difference_percent", "difference", scene.difference(ours as f64, input as f64)),
-            ("output", "words out", Cell::Whole(results)),
-            ("thesis_output", "thesis", Cell::Whole(output)),
-            (
-                "output_difference_percent",
-                "difference",
-                scene.difference(results as f64, output as f64),
-            ),
-            ("kind", "kind", Kind::Exact.cell()),
-        ]);
-    }
-    table
+        let ours = arrays.iter().map(|array| array.bytes).sum::<u64>() / 4;
+        let results = traffic.results.bytes / 4;
+        let [input_off, output_off] = [(ours, input), (results, output)]
+            .map(|(ours, thesis)| scene.difference(ours as f64, thesis as f64));
+        [[
+            ("velocity", "velocity", whole(each.velocity)),
+            ("collision", "collision", whole(each.collision)),
+            ("pose", "pose", whole(each.pose)),
+            ("result", "result", whole(each.result)),
+            ("input", "words in", whole(ours)),
+            ("thesis_input", "thesis", whole(input)),
+            ("input_difference_percent", "difference", input_off),
+            ("output", "words out", whole(results)),
+            ("thesis_output", "thesis", whole(output)),
+            ("output_difference_percent", "difference", output_off),
+        ]]
+    })
 }

@@ -1,53 +1,42 @@
 //! The tables of on-chip memory, logic and streams.
 
 use crate::estimate::thesis::recorded::Design;
-use crate::estimate::{BLOCKS, HP_PORTS, MemoryUse, StreamDemand};
+use crate::estimate::{BLOCKS, HP_PORTS, MemoryUse, ShapedBlocks, StreamDemand};
 use bitstream_model::Bandwidth;
+use pgs_interface::profile::Variant;
 
-use super::scene::{Scene, mib, printed_mib, yes_or_no};
+use super::scene::{Scene, mib, printed_mib, whole, yes_or_no};
 use crate::table::{Cell, Kind, Table, text};
 
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     vec![footprint(scene), arrays(scene), blocks(scene), logic(scene)]
 }
 
-fn uses(scene: &Scene) -> impl Iterator<Item = (&pgs_interface::profile::Variant, MemoryUse)> {
-    scene
-        .variants
-        .iter()
-        .map(|variant| (variant, MemoryUse::new(variant, scene.step.bodies, scene.step.collisions)))
+fn uses(scene: &Scene, variant: &Variant) -> MemoryUse {
+    MemoryUse::new(variant, scene.step.bodies, scene.step.collisions)
 }
 
 fn footprint(scene: &Scene) -> Table {
-    let mut table = Table::new("memory", "On-chip memory, MiB (§4.4.2)");
-    for (variant, memory) in uses(scene) {
+    let title = "On-chip memory, MiB (§4.4.2)";
+    let mut table = scene.table("memory", title, Kind::Exact, |variant| {
+        let memory = uses(scene, variant);
         let design = Design::of(variant.profile);
-        let beside = |bytes: u64, theirs: fn(&Design) -> f64| {
-            let thesis = Cell::known(design, |design| Cell::Number(theirs(design), 2));
-            let off =
-                Cell::known(design, |design| scene.difference(printed_mib(bytes), theirs(design)));
-            [Cell::Number(mib(bytes), 2), thesis, off]
-        };
-        let [ours, thesis, off] = beside(memory.block_ram(), |design| design.mebibytes);
-        let [more, thesis_more, off_more] =
-            beside(memory.with_positions(), |design| design.mebibytes_with_positions);
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("mib", "MiB", ours),
+        let (ours, more) = (memory.block_ram(), memory.with_positions());
+        let [thesis, off] = scene.beside(printed_mib(ours), design.map(|it| it.mebibytes), 2);
+        let with_positions = design.map(|it| it.mebibytes_with_positions);
+        let [thesis_more, off_more] = scene.beside(printed_mib(more), with_positions, 2);
+        let room = MemoryUse::collisions_beside(variant, scene.step.bodies);
+        [[
+            ("mib", "MiB", Cell::Number(mib(ours), 2)),
             ("thesis_mib", "thesis", thesis),
             ("difference_percent", "difference", off),
-            ("with_positions_mib", "with positions", more),
+            ("with_positions_mib", "with positions", Cell::Number(mib(more), 2)),
             ("thesis_with_positions_mib", "thesis", thesis_more),
             ("with_positions_difference_percent", "difference", off_more),
             ("fits", "of 4.0 MiB", text(if memory.fits() { "fits" } else { "does not fit" })),
-            (
-                "collisions_that_fit",
-                "room for collisions",
-                Cell::Whole(MemoryUse::collisions_beside(variant, scene.step.bodies)),
-            ),
-            ("kind", "kind", Kind::Exact.cell()),
-        ]);
-    }
+            ("collisions_that_fit", "room for collisions", whole(room)),
+        ]]
+    });
     table.note(
         "Differences are of the two digits that the thesis prints. Positions would be kept in as \
          many copies as the velocities; no profile keeps them.",
@@ -56,24 +45,21 @@ fn footprint(scene: &Scene) -> Table {
 }
 
 fn arrays(scene: &Scene) -> Table {
-    let mut table = Table::new("arrays", "On-chip memory by array");
-    for (variant, memory) in uses(scene) {
-        for array in &memory.arrays {
-            let shaped = array.shaped_blocks();
-            table.row([
-                ("profile", "profile", text(variant.profile.name)),
+    let mut table = scene.table("arrays", "On-chip memory by array", Kind::Modelled, |variant| {
+        uses(scene, variant).arrays.into_iter().map(|array| {
+            let ShapedBlocks { shape, blocks } = array.shaped_blocks();
+            [
                 ("array", "array", text(array.array.name())),
-                ("row_bytes", "row", Cell::Whole(array.row_bytes.into())),
-                ("rows", "rows", Cell::Whole(array.rows)),
-                ("copies", "copies", Cell::Whole(array.copies.into())),
-                ("bytes", "bytes", Cell::Whole(array.bytes())),
-                ("ideal_blocks", "by bits", Cell::Whole(array.ideal_blocks())),
-                ("shaped_blocks", "by shape", Cell::Whole(shaped.blocks)),
-                ("shape", "shape", text(format!("{} x {}", shaped.shape.rows, shaped.shape.bits))),
-                ("kind", "kind", Kind::Modelled.cell()),
-            ]);
-        }
-    }
+                ("row_bytes", "row", whole(array.row_bytes)),
+                ("rows", "rows", whole(array.rows)),
+                ("copies", "copies", whole(array.copies)),
+                ("bytes", "bytes", whole(array.bytes())),
+                ("ideal_blocks", "by bits", whole(array.ideal_blocks())),
+                ("shaped_blocks", "by shape", whole(blocks)),
+                ("shape", "shape", text(format!("{} x {}", shape.rows, shape.bits))),
+            ]
+        })
+    });
     table.note(
         "Row: bytes. A block is a BRAM_18K of 18,432 bits. By bits: none lost. By shape: the \
          fewest blocks of one shape side by side and one after the other; 1024 x 18 and narrower \
@@ -84,27 +70,27 @@ fn arrays(scene: &Scene) -> Table {
 }
 
 fn blocks(scene: &Scene) -> Table {
-    let mut table = Table::new("blocks", "BRAM_18K of 1,824 (T6.4, T6.8)");
     let percent = |blocks: u64| blocks as f64 / BLOCKS as f64 * 100.0;
-    let share = |blocks: u64| Cell::Share(percent(blocks));
-    for (variant, memory) in uses(scene) {
+    let title = "BRAM_18K of 1,824 (T6.4, T6.8)";
+    let mut table = scene.table("blocks", title, Kind::Modelled, |variant| {
         let thesis = Design::of(variant.profile).map(|design| f64::from(design.block_ram));
-        let off =
-            |blocks: u64| Cell::known(thesis, |thesis| scene.difference(percent(blocks), thesis));
+        let memory = uses(scene, variant);
         let (ideal, shaped) = (memory.ideal_blocks(), memory.shaped_blocks());
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("ideal_blocks", "by bits", Cell::Whole(ideal)),
-            ("ideal_percent", "share", share(ideal)),
-            ("shaped_blocks", "by shape", Cell::Whole(shaped)),
-            ("shaped_percent", "share", share(shaped)),
+        let [ideal_off, shaped_off] = [ideal, shaped].map(|blocks| {
+            let [_, off] = scene.beside(percent(blocks), thesis, 0);
+            off
+        });
+        [[
+            ("ideal_blocks", "by bits", whole(ideal)),
+            ("ideal_percent", "share", Cell::Share(percent(ideal))),
+            ("shaped_blocks", "by shape", whole(shaped)),
+            ("shaped_percent", "share", Cell::Share(percent(shaped))),
             ("thesis_percent", "thesis", Cell::known(thesis, Cell::Share)),
-            ("ideal_difference_percent", "by bits off", off(ideal)),
-            ("shaped_difference_percent", "by shape off", off(shaped)),
-            ("shaped_fit", "fits by shape", text(yes_or_no(shaped <= BLOCKS))),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
-    }
+            ("ideal_difference_percent", "by bits off", ideal_off),
+            ("shaped_difference_percent", "by shape off", shaped_off),
+            ("shaped_fit", "fits by shape", yes_or_no(shaped <= BLOCKS)),
+        ]]
+    });
     table.note(
         "Arrays only: FIFOs of streams and cores come on top. The thesis' shares are from its \
          synthesis report.",
@@ -113,63 +99,43 @@ fn blocks(scene: &Scene) -> Table {
 }
 
 fn logic(scene: &Scene) -> Table {
-    let mut table = Table::with_columns(
-        "logic",
-        "Logic, percent of the device (T6.4, T6.8)",
-        &[
-            ("profile", "profile"),
-            ("dsp", "DSP48E"),
-            ("lut", "LUT"),
-            ("ff", "FF"),
-            ("source", "source"),
-            ("kind", "kind"),
-        ],
-    );
+    let mut table = Table::new("logic", "Logic, percent of the device (T6.4, T6.8)");
     for variant in &scene.variants {
-        match Design::of(variant.profile) {
-            Some(design) => table.row([
-                text(variant.profile.name),
-                Cell::Share(design.dsp.into()),
-                Cell::Share(design.lookup_tables.into()),
-                Cell::Share(design.flip_flops.into()),
-                text(design.results),
-                Kind::Recorded.cell(),
-            ]),
-            None => table.row([
-                text(variant.profile.name),
-                Cell::Missing,
-                Cell::Missing,
-                Cell::Missing,
-                text("not known: nothing was synthesised"),
-                Kind::Open.cell(),
-            ]),
-        }
+        let design = Design::of(variant.profile);
+        let share = |of: fn(&Design) -> u32| Cell::known(design, |it| Cell::Share(of(it).into()));
+        let source = design.map_or("not known: nothing was synthesised", |design| design.results);
+        let kind = if design.is_some() { Kind::Recorded } else { Kind::Open };
+        table.row([
+            ("profile", "profile", text(variant.profile.name)),
+            ("dsp", "DSP48E", share(|design| design.dsp)),
+            ("lut", "LUT", share(|design| design.lookup_tables)),
+            ("ff", "FF", share(|design| design.flip_flops)),
+            ("source", "source", text(source)),
+            ("kind", "kind", kind.cell()),
+        ]);
     }
     table
 }
 
 /// Stream widths against the ports, and required bandwidth against the memory's.
 pub(super) fn streams(scene: &Scene) -> Vec<Table> {
-    let mut table = Table::new("streams", "Streams against ports and memory while a pass runs");
-    for variant in &scene.variants {
+    let title = "Streams against ports and memory while a pass runs";
+    let mut table = scene.table("streams", title, Kind::Modelled, |variant| {
         let demand = StreamDemand::new(variant);
         let share = |bandwidth| match bandwidth {
             Bandwidth::Unlimited => Cell::Missing,
             Bandwidth::BytesPerSecond(rate) => Cell::Share(demand.rate / rate as f64 * 100.0),
         };
-        let widths: Vec<String> =
-            variant.profile.mm2s_widths.iter().map(ToString::to_string).collect();
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
+        let widths: Vec<_> = variant.profile.mm2s_widths.iter().map(u32::to_string).collect();
+        [[
             ("widths", "widths, bits", text(widths.join(" + "))),
-            ("ports", "HP ports of 4", Cell::Whole(demand.ports as u64)),
-            ("fits", "fits", text(yes_or_no(demand.fits))),
+            ("ports", "HP ports of 4", whole(demand.ports as u64)),
+            ("fits", "fits", yes_or_no(demand.fits)),
             ("gb_per_second", "GB/s", Cell::Number(demand.rate / 1e9, 2)),
             ("of_peak_percent", "of 17.07", share(Bandwidth::ZCU102_PEAK)),
             ("of_sustained_percent", "of 12.8", share(Bandwidth::ZCU102_SUSTAINED)),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
-    }
+        ]]
+    });
     table.note(format!(
         "Each stream takes one of the {HP_PORTS} high-performance ports of 128 bits (UG1085). HP1 \
          and HP2 share a port of the memory controller. Above 100 % a pass waits for the memory.",

@@ -83,7 +83,7 @@ impl StepArgs {
     }
 
     /// The tables of this step.
-    fn part(&self, id: &str, tables: Tables) -> Result<Part> {
+    fn part(&self, tables: Tables) -> Result<Part> {
         let scene = self.scene();
         let tables = tables(&scene);
         if tables.is_empty() {
@@ -92,7 +92,7 @@ impl StepArgs {
         }
         // The thesis has its own step and its own designs alone.
         let of_thesis = scene.is_thesis_step() && self.profile == ALL && !self.world_inertia;
-        let rows = if of_thesis { rows::of(id, &tables)? } else { Vec::new() };
+        let rows = if of_thesis { rows::of(&tables) } else { Vec::new() };
         let mut part = Part { rows, ..Part::of(tables) };
         part.fact("step", self.head(&scene));
         let step = &scene.step;
@@ -134,8 +134,8 @@ impl StepArgs {
 }
 
 /// The tables of the step that the arguments give.
-fn part(args: &ArgMatches, id: &str, tables: Tables) -> Result<Part> {
-    given::<StepArgs>(args)?.part(id, tables)
+fn part(args: &ArgMatches, tables: Tables) -> Result<Part> {
+    given::<StepArgs>(args)?.part(tables)
 }
 
 /// Tables by formula.
@@ -143,59 +143,47 @@ type Tables = fn(&Scene) -> Vec<Table>;
 
 /// An experiment that only calculates.
 const fn formula(
-    id: &'static str,
-    thesis: &'static str,
-    about: &'static str,
+    [id, thesis, about]: [&'static str; 3],
     run: fn(&ArgMatches, &Session) -> Result<Part>,
 ) -> Experiment {
     let (boards, arguments) = (Boards::None, StepArgs::augment_args as fn(Command) -> Command);
     Experiment { id, thesis, about, boards, arguments, run }
 }
 
+const STEP: [&str; 3] =
+    ["step", "Tables 6.4 and 6.8", "Cycles and time of a step, and what world inertia costs"];
+const MIXED: [&str; 3] = ["mixed", "§7.3", "A design of ours, mixed, against float"];
+const WINDOWED: [&str; 3] =
+    ["windowed", "§4.7, §7.3", "Two designs that stream the collisions once, against float"];
+const DATA: [&str; 3] = ["data", "§4.4.1, Tables 4.1 to 4.6", "Words in and out"];
+const MEMORY: [&str; 3] = ["memory", "§4.4.2, Tables 6.4 and 6.8", "On-chip memory and logic"];
+const STREAMS: [&str; 3] = ["streams", "§5.4.2", "Stream widths and memory bandwidth"];
+const PORTS: [&str; 3] = ["ports", "§5.4.3, §5.5", "Block RAM ports and the initiation interval"];
+const WARM: [&str; 3] = ["warm", "§2.2.3", "The cost of a warm start"];
+const COMPARISON: [&str; 3] = [
+    "comparison",
+    "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
+    "Speed-up and energy against GPU and CPU",
+];
+const EULER: [&str; 3] = ["euler", "§2.1.3, Figure 2.6", "Explicit integration of a fall"];
+
 /// All of them.
 pub(crate) static FORMULAS: [Experiment; 10] = [
-    formula(
-        "step",
-        "Tables 6.4 and 6.8",
-        "Cycles and time of a step, and what world inertia costs",
-        |args, _| part(args, "step", step::tables),
-    ),
-    formula("mixed", "§7.3", "A design of ours, mixed, against float", |args, _| {
-        part(args, "mixed", mixed::tables)
+    formula(STEP, |args, _| part(args, step::tables)),
+    formula(MIXED, |args, _| part(args, mixed::tables)),
+    formula(WINDOWED, |args, _| part(args, windowed::tables)),
+    formula(DATA, |args, _| part(args, data::tables)),
+    formula(MEMORY, |args, _| part(args, memory::tables)),
+    formula(STREAMS, |args, _| part(args, memory::streams)),
+    formula(PORTS, |args, _| part(args, ports::tables)),
+    formula(WARM, |args, _| part(args, warm::tables)),
+    formula(COMPARISON, |args, _| {
+        let mut part = part(args, comparison::tables)?;
+        comparison::figures(&mut part);
+        Ok(part)
     }),
-    formula(
-        "windowed",
-        "§4.7, §7.3",
-        "Two designs that stream the collisions once, against float",
-        |args, _| part(args, "windowed", windowed::tables),
-    ),
-    formula("data", "§4.4.1, Tables 4.1 to 4.6", "Words in and out", |args, _| {
-        part(args, "data", data::tables)
-    }),
-    formula("memory", "§4.4.2, Tables 6.4 and 6.8", "On-chip memory and logic", |args, _| {
-        part(args, "memory", memory::tables)
-    }),
-    formula("streams", "§5.4.2", "Stream widths and memory bandwidth", |args, _| {
-        part(args, "streams", memory::streams)
-    }),
-    formula("ports", "§5.4.3, §5.5", "Block RAM ports and the initiation interval", |args, _| {
-        part(args, "ports", ports::tables)
-    }),
-    formula("warm", "§2.2.3", "The cost of a warm start", |args, _| {
-        part(args, "warm", warm::tables)
-    }),
-    formula(
-        "comparison",
-        "§6.4, §6.5, Tables 6.5 to 6.7 and 6.9 to 6.11",
-        "Speed-up and energy against GPU and CPU",
-        |args, _| {
-            let mut part = part(args, "comparison", comparison::tables)?;
-            comparison::figures(&mut part);
-            Ok(part)
-        },
-    ),
-    formula("euler", "§2.1.3, Figure 2.6", "Explicit integration of a fall", |args, _| {
-        let mut part = part(args, "euler", euler::tables)?;
+    formula(EULER, |args, _| {
+        let mut part = part(args, euler::tables)?;
         euler::figures(&mut part);
         Ok(part)
     }),

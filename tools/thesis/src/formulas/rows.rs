@@ -6,116 +6,63 @@ use pgs_interface::profile::FLOAT;
 
 use crate::index::{Origin, Row};
 use crate::table::{Cell, Table, anchor};
-use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 
-/// A table of the thesis, and the columns that hold its figures and ours.
+/// A table of ours, and the columns that hold the thesis' figures and ours.
 struct Source {
     /// Id of the table.
     table: &'static str,
-    section: &'static str,
-    /// The place in the thesis.
-    thesis: Place,
+    /// The place in the thesis; in braces a table of the design of the row's profile, or the table
+    /// that the row names.
+    thesis: &'static str,
     /// Keys of the columns that name a row; without one all rows of the table are one of the index:
     /// before and after each reduction.
     names: &'static [&'static str],
     figures: &'static [Figure],
 }
 
-/// Where the thesis has the figures of a row.
-enum Place {
-    /// All rows.
-    Fixed(&'static str),
-    /// By the design of the row's profile.
-    OfDesign(fn(&Design) -> String),
-    /// By the design, in the table that the row names.
-    Named,
+/// The column of a figure of the thesis, the one of ours, and the unit.
+type Figure = (&'static str, &'static str, &'static str);
+
+const fn source(
+    table: &'static str,
+    thesis: &'static str,
+    names: &'static [&'static str],
+    figures: &'static [Figure],
+) -> Source {
+    Source { table, thesis, names, figures }
 }
 
-/// Columns with a figure of the thesis and ours.
-struct Figure {
-    recorded: &'static str,
-    /// Ours, or where this column is empty the one behind it.
-    ours: &'static [&'static str],
-    unit: &'static str,
-}
-
-const fn figure(
-    recorded: &'static str,
-    ours: &'static [&'static str],
-    unit: &'static str,
-) -> Figure {
-    Figure { recorded, ours, unit }
-}
-
-/// A table of words, bytes and stream accesses.
-const fn data(table: &'static str, thesis: &'static str) -> Source {
-    const FIGURES: [Figure; 3] = [
-        figure("thesis_words", &["words"], " words"),
-        figure("thesis_mib", &["mib"], " MiB"),
-        figure("thesis_beats", &["beats"], " beats"),
-    ];
-    Source { table, section: "data", thesis: Place::Fixed(thesis), names: &[], figures: &FIGURES }
-}
+/// Words, bytes and stream accesses.
+const DATA: &[Figure] = &[
+    ("thesis_words", "words", " words"),
+    ("thesis_mib", "mib", " MiB"),
+    ("thesis_beats", "beats", " beats"),
+];
+const POSITIONS: Figure = ("thesis_with_positions_mib", "with_positions_mib", " MiB");
+const ENERGY: &str = "§6.4, §6.5, Tables 6.5 and 6.9: energy of GPU and CPU, J";
+const BANDWIDTH: &[&str] = &["profile", "records", "bandwidth"];
 
 /// The tables that have figures of the thesis.
 const SOURCES: [Source; 13] = [
-    data("T4.1", "§4.4.1, Table 4.1"),
-    data("T4.2", "§4.4.1, Table 4.2"),
-    data("T4.3", "§4.4.1, Table 4.3"),
-    data("T4.4", "§4.4.1, Table 4.4"),
-    data("T4.5", "§4.4.1, Table 4.5"),
-    data("T4.6", "§4.4.1, Table 4.6"),
-    Source {
-        table: "memory",
-        section: "memory",
-        thesis: Place::Fixed("§4.4.2"),
-        names: &["profile"],
-        figures: &[figure("thesis_mib", &["mib"], " MiB")],
-    },
-    Source {
-        table: "memory",
-        section: "memory",
-        thesis: Place::Fixed("§4.4.2, with positions"),
-        names: &["profile"],
-        figures: &[figure("thesis_with_positions_mib", &["with_positions_mib"], " MiB")],
-    },
-    Source {
-        table: "cycles",
-        section: "step",
-        thesis: Place::OfDesign(|design| of_design(design, design.results, ": cycles")),
-        names: &["profile", "records"],
-        figures: &[figure("thesis", &["total"], "")],
-    },
-    Source {
-        table: "blocks",
-        section: "memory",
-        thesis: Place::OfDesign(|design| of_design(design, design.results, ": BRAM_18K")),
-        names: &["profile"],
-        figures: &[figure("thesis_percent", &["ideal_percent"], "")],
-    },
-    Source {
-        table: "time",
-        section: "step",
-        thesis: Place::OfDesign(|design| of_design(design, design.comparison, ": ms")),
-        names: &["profile", "records", "bandwidth"],
-        figures: &[figure("thesis_ms", &["ms"], "")],
-    },
-    Source {
-        table: "platforms",
-        section: "comparison",
-        thesis: Place::Fixed("§6.4, §6.5, Tables 6.5 and 6.9: energy of GPU and CPU, J"),
-        names: &["platform"],
-        figures: &[figure("joules", &["recomputed_joules"], "")],
-    },
-    Source {
-        table: "comparison",
-        section: "comparison",
-        thesis: Place::Named,
-        names: &["profile", "figure"],
-        // The thesis' powers give the power efficiency, without a figure of ours.
-        figures: &[figure("thesis", &["packed_unlimited", "recomputed"], "")],
-    },
+    source("T4.1", "§4.4.1, Table 4.1", &[], DATA),
+    source("T4.2", "§4.4.1, Table 4.2", &[], DATA),
+    source("T4.3", "§4.4.1, Table 4.3", &[], DATA),
+    source("T4.4", "§4.4.1, Table 4.4", &[], DATA),
+    source("T4.5", "§4.4.1, Table 4.5", &[], DATA),
+    source("T4.6", "§4.4.1, Table 4.6", &[], DATA),
+    source("memory", "§4.4.2", &["profile"], &[("thesis_mib", "mib", " MiB")]),
+    source("memory", "§4.4.2, with positions", &["profile"], &[POSITIONS]),
+    source("cycles", "{results}: cycles", &["profile", "records"], &[("thesis", "total", "")]),
+    source(
+        "blocks",
+        "{results}: BRAM_18K",
+        &["profile"],
+        &[("thesis_percent", "ideal_percent", "")],
+    ),
+    source("time", "{latency}: ms", BANDWIDTH, &[("thesis_ms", "ms", "")]),
+    source("platforms", ENERGY, &["platform"], &[("joules", "recomputed_joules", "")]),
+    source("comparison", "{table}", &["profile", "figure"], &[("thesis", "packed_unlimited", "")]),
 ];
 
 /// A place of a design's figures, from the short name of a table.
@@ -127,58 +74,68 @@ fn of_design(design: &Design, table: &str, what: &str) -> String {
     format!("{}, {table}{what}", design.section)
 }
 
-/// The rows of the index that lead to the tables of an experiment.
-pub(super) fn of(section: &str, tables: &[Table]) -> Result<Vec<Row>> {
-    let mut rows = match section {
-        "memory" => std::iter::once(device()).chain(DESIGNS.map(logic)).collect(),
-        "comparison" => vec![powers()],
-        _ => Vec::new(),
-    };
-    for source in SOURCES.iter().filter(|source| source.section == section) {
-        let table = tables.iter().find(|table| table.id == source.table);
-        let table = table.ok_or_else(|| source.missing("table"))?;
-        match source.names {
-            [] => rows.push(source.together(table)?),
-            names => rows.extend(source.each(table, names)?),
+/// The rows of the index that lead to these tables.
+pub(super) fn of(tables: &[Table]) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for table in tables {
+        match table.id {
+            "memory" => rows.extend(std::iter::once(device()).chain(DESIGNS.map(logic))),
+            "platforms" => rows.push(powers()),
+            _ => {}
         }
     }
-    Ok(rows)
+    for source in &SOURCES {
+        let Some(table) = tables.iter().find(|table| table.id == source.table) else { continue };
+        match source.names {
+            [] => rows.push(source.together(table)),
+            _ => rows.extend(source.each(table)),
+        }
+    }
+    rows
+}
+
+fn row(
+    thesis: String,
+    subject: String,
+    [recorded, ours]: [String; 2],
+    origin: Origin,
+    command: &str,
+    shown: String,
+) -> Row {
+    Row { thesis, subject, recorded, ours, origin, command: command.to_owned(), shown }
 }
 
 /// The block RAM of the device (Table 6.1).
 fn device() -> Row {
     let mebibytes = (BLOCKS * BLOCK_BITS) as f64 / 8.0 / f64::from(1 << 20);
-    Row {
-        thesis: "§6.1.1, Table 6.1".to_owned(),
-        subject: "block RAM of the device".to_owned(),
-        recorded: format!("{DEVICE_MEGABYTES} MB"),
-        ours: format!("{} BRAM_18K: {mebibytes:.1} MiB", grouped(BLOCKS)),
-        origin: Origin::Modelled,
-        command: String::new(),
-        shown: anchor("blocks"),
-    }
+    let ours = format!("{} BRAM_18K: {mebibytes:.1} MiB", grouped(BLOCKS));
+    row(
+        "§6.1.1, Table 6.1".to_owned(),
+        "block RAM of the device".to_owned(),
+        [format!("{DEVICE_MEGABYTES} MB"), ours],
+        Origin::Modelled,
+        "",
+        anchor("blocks"),
+    )
 }
 
 /// The powers of GPU and CPU (Tables 6.2 and 6.3).
 fn powers() -> Row {
     let both = |watts: fn(&Platform) -> f64| format!("{} W and {} W", watts(&GPU), watts(&CPU));
-    Row {
-        thesis: "§6.1.2, §6.1.3, Tables 6.2 and 6.3".to_owned(),
-        subject: format!("thermal design power of {} and {}", GPU.name, CPU.name),
-        recorded: both(|platform| platform.design_watts),
-        ours: format!(
-            "not measured; Tables 6.5 and 6.9 calculate with {}",
-            both(|platform| platform.watts)
-        ),
-        origin: Origin::Open,
-        command: String::new(),
-        shown: anchor("platforms"),
-    }
+    let calculated = both(|platform| platform.watts);
+    let ours = format!("not measured; Tables 6.5 and 6.9 calculate with {calculated}");
+    row(
+        "§6.1.2, §6.1.3, Tables 6.2 and 6.3".to_owned(),
+        format!("thermal design power of {} and {}", GPU.name, CPU.name),
+        [both(|platform| platform.design_watts), ours],
+        Origin::Open,
+        "",
+        anchor("platforms"),
+    )
 }
 
 /// Logic and clock of a design (Tables 6.4 and 6.8), which no synthesis has given for ours.
 fn logic(design: &Design) -> Row {
-    let name = design.profile.name;
     let Design { dsp, flip_flops, lookup_tables, clock_mhz, .. } = design;
     // The Verilog is of this profile.
     let (counted, command) = match design.profile.id == FLOAT.id {
@@ -188,108 +145,73 @@ fn logic(design: &Design) -> Row {
         ),
         false => ("it has no Verilog", ""),
     };
-    Row {
-        thesis: of_design(design, design.results, ": logic and clock"),
-        subject: format!("{name}: DSP48E, FF, LUT, clock"),
-        recorded: format!("{dsp} %, {flip_flops} %, {lookup_tables} %, {clock_mhz} MHz"),
-        ours: format!("not synthesised by Vivado; {counted}; the clock is taken from the thesis"),
-        origin: Origin::Open,
-        command: command.to_owned(),
-        shown: anchor("logic"),
-    }
+    let ours = format!("not synthesised by Vivado; {counted}; the clock is taken from the thesis");
+    row(
+        of_design(design, design.results, ": logic and clock"),
+        format!("{}: DSP48E, FF, LUT, clock", design.profile.name),
+        [format!("{dsp} %, {flip_flops} %, {lookup_tables} %, {clock_mhz} MHz"), ours],
+        Origin::Open,
+        command,
+        anchor("logic"),
+    )
+}
+
+/// The cell of a row in the column with this key, if it is known.
+fn known(table: &Table, row: &[Cell], key: &str) -> Option<String> {
+    let place = table.columns.iter().position(|column| column.key == key)?;
+    (row[place] != Cell::Missing).then(|| row[place].shown())
 }
 
 impl Source {
-    fn missing(&self, what: &str) -> Failure {
-        Failure::new(Cause::Input, format!("the model has no {what} in {}", self.table))
-    }
-
-    fn column(&self, table: &Table, key: &str) -> Result<usize> {
-        let place = table.columns.iter().position(|column| column.key == key);
-        place.ok_or_else(|| self.missing(key))
-    }
-
-    /// The first of these cells of a row that is known.
-    fn known(&self, table: &Table, row: &[Cell], keys: &[&str]) -> Result<Option<String>> {
-        for key in keys {
-            let cell = &row[self.column(table, key)?];
-            if *cell != Cell::Missing {
-                return Ok(Some(cell.shown()));
-            }
-        }
-        Ok(None)
-    }
-
     /// All rows of a table in one of the index.
-    fn together(&self, table: &Table) -> Result<Row> {
-        let all = |keys_of: fn(&Figure) -> &[&'static str]| -> Result<String> {
-            let mut figures = Vec::new();
-            for figure in self.figures {
-                let mut cells = Vec::new();
-                for row in &table.rows {
-                    cells.extend(self.known(table, row, keys_of(figure))?);
-                }
-                figures.push(cells.join(" → ") + figure.unit);
-            }
-            Ok(figures.join(", "))
+    fn together(&self, table: &Table) -> Row {
+        let all = |key: fn(&Figure) -> &'static str| {
+            let figures = self.figures.iter().map(|figure| {
+                let rows = table.rows.iter();
+                let cells: Vec<_> = rows.filter_map(|row| known(table, row, key(figure))).collect();
+                cells.join(" → ") + figure.2
+            });
+            figures.collect::<Vec<_>>().join(", ")
         };
         let subject = table.title.split(':').next().unwrap_or_default();
         let subject = subject.trim_start_matches(table.id).trim().to_owned();
-        let recorded = all(|figure| std::slice::from_ref(&figure.recorded))?;
-        let ours = all(|figure| figure.ours)?;
-        Ok(self.row(table, None, subject, recorded, ours))
+        let (recorded, ours) = (all(|figure| figure.0), all(|figure| figure.1));
+        let thesis = self.thesis.to_owned();
+        row(thesis, subject, [recorded, ours], Origin::Modelled, "", table.anchor())
     }
 
     /// A row of the index for each row that has both figures.
-    fn each(&self, table: &Table, names: &[&str]) -> Result<Vec<Row>> {
+    fn each(&self, table: &Table) -> Vec<Row> {
         let mut rows = Vec::new();
         for cells in &table.rows {
-            for figure in self.figures {
-                let recorded = self.known(table, cells, &[figure.recorded])?;
-                let ours = self.known(table, cells, figure.ours)?;
-                // Powers of the thesis alone have no figure of ours to stand beside it.
-                let Some((recorded, ours)) = recorded.zip(ours) else { continue };
-                let subject = names
-                    .iter()
-                    .map(|name| Ok(cells[self.column(table, name)?].shown()))
-                    .collect::<Result<Vec<_>>>()?;
-                let [recorded, ours] = [recorded, ours].map(|text| text + figure.unit);
-                rows.push(self.row(table, Some(cells), subject.join(", "), recorded, ours));
+            let cell = |key: &str| known(table, cells, key);
+            for &(recorded, ours, unit) in self.figures {
+                // The thesis' powers give the power efficiency, without a figure of ours.
+                let ours = cell(ours).or_else(|| cell("recomputed"));
+                let Some(both) = cell(recorded).zip(ours) else { continue };
+                let subject = self.names.iter().filter_map(|name| cell(name)).collect::<Vec<_>>();
+                let thesis = self.place(cell).unwrap_or_else(|| "Chapter 6".to_owned());
+                let figures = [both.0, both.1].map(|text| text + unit);
+                let shown = table.anchor();
+                rows.push(row(thesis, subject.join(", "), figures, Origin::Modelled, "", shown));
             }
         }
-        Ok(rows)
+        rows
     }
 
-    fn row(
-        &self,
-        table: &Table,
-        cells: Option<&[Cell]>,
-        subject: String,
-        recorded: String,
-        ours: String,
-    ) -> Row {
-        let cell = |key: &str| {
-            let place = table.columns.iter().position(|column| column.key == key)?;
-            cells.map(|cells| cells[place].shown())
+    /// The place of a row in the thesis.
+    fn place(&self, cell: impl Fn(&str) -> Option<String>) -> Option<String> {
+        let Some((table, what)) = self.thesis.split_once('}') else {
+            return Some(self.thesis.to_owned());
         };
-        let design = || {
-            let name = cell("profile")?;
-            DESIGNS.into_iter().find(|design| design.profile.name == name)
+        let name = cell("profile")?;
+        let design = DESIGNS.into_iter().find(|design| design.profile.name == name)?;
+        let table = match table {
+            "{results" => design.results.to_owned(),
+            "{latency" => design.comparison.to_owned(),
+            _ => cell("table")?,
         };
-        let thesis = match self.thesis {
-            Place::Fixed(thesis) => Some(thesis.to_owned()),
-            Place::OfDesign(place) => design().map(place),
-            Place::Named => design().zip(cell("table")).map(|(d, table)| of_design(d, &table, "")),
-        };
-        Row {
-            thesis: thesis.unwrap_or_else(|| "Chapter 6".to_owned()),
-            subject,
-            recorded,
-            ours,
-            origin: Origin::Modelled,
-            command: String::new(),
-            shown: table.anchor(),
-        }
+        Some(of_design(design, &table, what))
     }
 }
 

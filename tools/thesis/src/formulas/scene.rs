@@ -4,7 +4,7 @@ use crate::estimate::{StepShape, thesis};
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::Variant;
 
-use crate::table::Cell;
+use crate::table::{Cell, Kind, Table, text};
 
 /// The subject of the tables.
 #[derive(Debug, Clone)]
@@ -24,6 +24,40 @@ impl Scene {
     pub(super) fn difference(&self, ours: f64, thesis: f64) -> Cell {
         if self.is_thesis_step() { difference(ours, thesis) } else { Cell::Missing }
     }
+
+    /// The thesis' figure, if it has one, and the deviation of ours.
+    pub(super) fn beside(&self, ours: f64, thesis: Option<f64>, digits: usize) -> [Cell; 2] {
+        let off = Cell::known(thesis, |thesis| self.difference(ours, thesis));
+        [Cell::known(thesis, |thesis| Cell::Number(thesis, digits)), off]
+    }
+
+    /// A table with the rows of each design: its name, the cells of `rows`, and the kind.
+    pub(super) fn table<'a, All, Row>(
+        &'a self,
+        id: &'static str,
+        title: &str,
+        kind: Kind,
+        rows: impl Fn(&'a Variant) -> All,
+    ) -> Table
+    where
+        All: IntoIterator<Item = Row>,
+        Row: IntoIterator<Item = (&'static str, &'static str, Cell)>,
+    {
+        let mut table = Table::new(id, title);
+        for variant in &self.variants {
+            let name = ("profile", "profile", text(variant.profile.name));
+            for row in rows(variant) {
+                let row = std::iter::once(name.clone()).chain(row);
+                table.row(row.chain([("kind", "kind", kind.cell())]));
+            }
+        }
+        table
+    }
+}
+
+/// A count.
+pub(super) fn whole(count: impl Into<u64>) -> Cell {
+    Cell::Whole(count.into())
 }
 
 /// The deviation of a figure from another one, percent.
@@ -40,6 +74,6 @@ pub(super) fn printed_mib(bytes: u64) -> f64 {
     (mib(bytes) * 100.0).round() / 100.0
 }
 
-pub(super) fn yes_or_no(yes: bool) -> &'static str {
-    if yes { "yes" } else { "no" }
+pub(super) fn yes_or_no(yes: bool) -> Cell {
+    text(if yes { "yes" } else { "no" })
 }

@@ -5,7 +5,7 @@ use crate::estimate::{MemoryUse, Records, StepCycles, StepTime, Window};
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::{Inertia, Variant};
 
-use super::scene::{Scene, difference, mib, yes_or_no};
+use super::scene::{Scene, difference, mib, whole, yes_or_no};
 use crate::table::{Cell, Kind, Table, text};
 use pgs_command::options::bandwidth::bandwidth_text;
 
@@ -14,32 +14,25 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
 }
 
 fn cycles(scene: &Scene) -> Table {
-    let mut table = Table::new("cycles", "Cycles of a step by formula (T6.4, T6.8)");
-    for variant in &scene.variants {
-        let design = Design::of(variant.profile);
-        for records in Records::ALL {
+    let title = "Cycles of a step by formula (T6.4, T6.8)";
+    let mut table = scene.table("cycles", title, Kind::Modelled, |variant| {
+        let thesis = Design::of(variant.profile).map(|design| design.cycles);
+        Records::ALL.map(|records| {
             let cycles = StepCycles::new(variant, records, &scene.step);
-            table.row([
-                ("profile", "profile", text(variant.profile.name)),
+            let [_, off] = scene.beside(cycles.total as f64, thesis.map(|cycles| cycles as f64), 0);
+            [
                 ("records", "records", text(records.name())),
-                ("load", "load", Cell::Whole(cycles.load)),
-                ("pass", "one pass", Cell::Whole(cycles.pass)),
-                ("fill", "fill", Cell::Whole(cycles.fill)),
-                ("integration", "integration", Cell::Whole(cycles.integration())),
-                ("integration_fill", "its fill", Cell::Whole(cycles.integration_fill)),
-                ("total", "total", Cell::Whole(cycles.total)),
-                ("thesis", "thesis", Cell::known(design, |design| Cell::Whole(design.cycles))),
-                (
-                    "difference_percent",
-                    "difference",
-                    Cell::known(design, |design| {
-                        scene.difference(cycles.total as f64, design.cycles as f64)
-                    }),
-                ),
-                ("kind", "kind", Kind::Modelled.cell()),
-            ]);
-        }
-    }
+                ("load", "load", whole(cycles.load)),
+                ("pass", "one pass", whole(cycles.pass)),
+                ("fill", "fill", whole(cycles.fill)),
+                ("integration", "integration", whole(cycles.integration())),
+                ("integration_fill", "its fill", whole(cycles.integration_fill)),
+                ("total", "total", whole(cycles.total)),
+                ("thesis", "thesis", Cell::known(thesis, whole)),
+                ("difference_percent", "difference", off),
+            ]
+        })
+    });
     table.note(format!(
         "One formula for every profile that runs one pass after the other: load + {} passes + fill \
          + integration, the longer of poses in and results out, + its fill, from the last body in \
@@ -62,41 +55,30 @@ fn cycles(scene: &Scene) -> Table {
 }
 
 fn times(scene: &Scene) -> Table {
-    let mut table = Table::new("time", "Time of a step by memory bandwidth");
-    for variant in &scene.variants {
-        let design = Design::of(variant.profile);
-        for records in Records::ALL {
-            for bandwidth in &scene.bandwidths {
-                let time = StepTime::new(variant, records, &scene.step, *bandwidth);
-                // The thesis' cycles contain no memory waits, and it states a bandwidth.
-                let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH];
-                let design = design.filter(|_| stated.contains(bandwidth));
-                table.row([
-                    ("profile", "profile", text(variant.profile.name)),
-                    ("records", "records", text(records.name())),
-                    ("bandwidth", "bandwidth", text(bandwidth_text(*bandwidth))),
-                    ("bytes", "bytes moved", Cell::Whole(time.bytes)),
-                    ("ms", "ms", Cell::Number(time.seconds * 1e3, 3)),
-                    ("load_limit", "load by", text(time.load.limit.name())),
-                    ("pass_limit", "passes by", text(time.pass.limit.name())),
-                    ("integration_limit", "integration by", text(time.integration.limit.name())),
-                    (
-                        "thesis_ms",
-                        "thesis ms",
-                        Cell::known(design, |design| Cell::Number(design.latency_ms, 2)),
-                    ),
-                    (
-                        "difference_percent",
-                        "difference",
-                        Cell::known(design, |design| {
-                            scene.difference(time.seconds * 1e3, design.latency_ms)
-                        }),
-                    ),
-                    ("kind", "kind", Kind::Modelled.cell()),
-                ]);
-            }
-        }
-    }
+    let title = "Time of a step by memory bandwidth";
+    let mut table = scene.table("time", title, Kind::Modelled, |variant| {
+        let row = |records, bandwidth| {
+            let time = StepTime::new(variant, records, &scene.step, bandwidth);
+            // The thesis' cycles contain no memory waits, and it states a bandwidth.
+            let stated = [Bandwidth::Unlimited, MEMORY_BANDWIDTH].contains(&bandwidth);
+            let design = Design::of(variant.profile).filter(|_| stated);
+            let ms = time.seconds * 1e3;
+            let [thesis, off] = scene.beside(ms, design.map(|design| design.latency_ms), 2);
+            [
+                ("records", "records", text(records.name())),
+                ("bandwidth", "bandwidth", text(bandwidth_text(bandwidth))),
+                ("bytes", "bytes moved", whole(time.bytes)),
+                ("ms", "ms", Cell::Number(ms, 3)),
+                ("load_limit", "load by", text(time.load.limit.name())),
+                ("pass_limit", "passes by", text(time.pass.limit.name())),
+                ("integration_limit", "integration by", text(time.integration.limit.name())),
+                ("thesis_ms", "thesis ms", thesis),
+                ("difference_percent", "difference", off),
+            ]
+        };
+        let all = |records| scene.bandwidths.iter().map(move |bandwidth| row(records, *bandwidth));
+        Records::ALL.into_iter().flat_map(all).collect::<Vec<_>>()
+    });
     table.note(
         "17.07 GB/s is the peak of the ZCU102 preset, 12.8 GB/s what a published measurement \
          sustains. The thesis states 16 GB/s for its memory (§5.4.2), a pass of its float design \
@@ -107,26 +89,21 @@ fn times(scene: &Scene) -> Table {
 }
 
 fn world_inertia(scene: &Scene) -> Table {
-    let mut table =
-        Table::new("inertia", "What the world inertia of every body costs, records as streamed");
-    for variant in &scene.variants {
-        let both = [Inertia::Isotropic, Inertia::World].map(|inertia| {
-            let variant = Variant { inertia, ..*variant };
-            let cycles = StepCycles::new(&variant, Records::Streamed, &scene.step).total;
-            let memory = MemoryUse::new(&variant, scene.step.bodies, scene.step.collisions);
-            (cycles, memory)
-        });
-        let [(without, memory_without), (with, memory_with)] = both;
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("cycles_without", "cycles", Cell::Whole(without)),
-            ("cycles_with", "with it", Cell::Whole(with)),
+    let title = "What the world inertia of every body costs, records as streamed";
+    scene.table("inertia", title, Kind::Modelled, |variant| {
+        let [(without, memory_without), (with, memory_with)] = [Inertia::Isotropic, Inertia::World]
+            .map(|inertia| {
+                let variant = Variant { inertia, ..*variant };
+                let cycles = StepCycles::new(&variant, Records::Streamed, &scene.step).total;
+                (cycles, MemoryUse::new(&variant, scene.step.bodies, scene.step.collisions))
+            });
+        [[
+            ("cycles_without", "cycles", whole(without)),
+            ("cycles_with", "with it", whole(with)),
             ("difference_percent", "difference", difference(with as f64, without as f64)),
             ("mib_without", "MiB on chip", Cell::Number(mib(memory_without.block_ram()), 2)),
             ("mib_with", "with it", Cell::Number(mib(memory_with.block_ram()), 2)),
-            ("fit", "fits", text(yes_or_no(memory_with.fits()))),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
-    }
-    table
+            ("fit", "fits", yes_or_no(memory_with.fits())),
+        ]]
+    })
 }

@@ -1,58 +1,58 @@
 //! Shows the designs that stream the collisions once: cycles, bytes, memory, logic.
 
-use crate::estimate::{
-    MemoryUse, Records, StepTime, StepTraffic, Window, WindowCycles, WindowLogic, WindowStep,
-};
+use crate::estimate::{MemoryUse, Records, StepCycles, StepTime, StepTraffic, Window};
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::{FLOAT, Variant};
 
-use super::scene::{Scene, mib, yes_or_no};
+use super::scene::{Scene, mib, whole, yes_or_no};
 use crate::table::{Cell, Kind, Table, text};
 
 /// The tables, if one of these designs is among the profiles.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
-    let designs: Vec<(&Variant, &Window)> = scene
-        .variants
-        .iter()
-        .filter_map(|variant| Some((variant, Window::of(variant.profile)?)))
-        .collect();
-    if designs.is_empty() {
+    let mut scene = scene.clone();
+    scene.variants.retain(|variant| Window::of(variant.profile).is_some());
+    if scene.variants.is_empty() {
         return Vec::new();
     }
-    vec![cycles(scene, &designs), gains(scene, &designs), logic(&designs)]
+    vec![cycles(&scene), gains(&scene), logic(&scene)]
 }
 
-fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
-    let mut table = Table::new(
-        "window_cycles",
-        "Collisions streamed once: cycles of a step whose order needs all of the delay lines",
-    );
-    for (variant, design) in designs {
-        let step = WindowStep::longest(design, scene.step);
-        let Some(cycles) = WindowCycles::new(variant, &step) else { continue };
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("contact_units", "contact units", Cell::Whole(design.contact_units.into())),
-            ("friction_units", "friction", Cell::Whole(design.friction_units.into())),
-            ("slot", "slot", Cell::Whole(cycles.slot)),
-            ("stream", "first pass", Cell::Whole(cycles.stream)),
-            ("behind", "last behind it", Cell::Whole(cycles.behind)),
-            ("fill", "fill", Cell::Whole(cycles.fill)),
-            ("passes", "solver", Cell::Whole(cycles.passes)),
-            ("load", "load beside it", Cell::Whole(cycles.load)),
-            ("integration", "integration", Cell::Whole(cycles.integration)),
-            ("integration_fill", "its fill", Cell::Whole(cycles.integration_fill)),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
+fn cycles(scene: &Scene) -> Table {
+    let title =
+        "Collisions streamed once: cycles of a step whose order needs all of the delay lines";
+    let mut table = scene.table("window_cycles", title, Kind::Modelled, |variant| {
+        let (profile, step) = (variant.profile, &scene.step);
+        Window::of(profile).map(|design| {
+            let cycles = StepCycles::new(variant, Records::Streamed, step);
+            let traffic = StepTraffic::new(variant, Records::Streamed, step);
+            let behind = design.behind(profile, step);
+            let integration = traffic.poses.cycles.max(traffic.results.cycles);
+            [
+                ("contact_units", "contact units", whole(design.units)),
+                ("friction_units", "friction", whole(design.units)),
+                ("slot", "slot", whole(design.slot(profile, step))),
+                ("stream", "first pass", whole(cycles.pass)),
+                ("behind", "last behind it", whole(behind)),
+                ("fill", "fill", whole(cycles.fill - behind)),
+                ("passes", "solver", whole(cycles.pass + cycles.fill)),
+                ("load", "load beside it", whole(traffic.velocities.cycles)),
+                ("integration", "integration", whole(integration)),
+                ("integration_fill", "its fill", whole(cycles.integration_fill)),
+            ]
+        })
+    });
+    for variant in &scene.variants {
+        let (profile, step) = (variant.profile, &scene.step);
+        let Some(design) = Window::of(profile) else { continue };
+        let fill =
+            StepCycles::new(variant, Records::Streamed, step).fill - design.behind(profile, step);
         table.note(format!(
-            "{}: (C + {} x {}) x {} + {}. An order with a longest span of s entries needs a lag of \
-             s + ceil(window / slot) + 1 instead of {}.",
-            variant.profile.name,
-            scene.step.passes().saturating_sub(1),
-            step.lag,
-            cycles.slot,
-            cycles.fill,
-            step.lag,
+            "{}: (C + {} x {lag}) x {} + {fill}. An order with a longest span of s entries needs a \
+             lag of s + ceil(window / slot) + 1 instead of {lag}.",
+            profile.name,
+            step.passes().saturating_sub(1),
+            design.slot(profile, step),
+            lag = design.lag,
         ));
     }
     table.note(
@@ -65,10 +65,9 @@ fn cycles(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
     table
 }
 
-fn gains(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
-    let mut table =
-        Table::new("window_gains", "Collisions streamed once, against float, records as streamed");
-    for (variant, _) in designs {
+fn gains(scene: &Scene) -> Table {
+    let title = "Collisions streamed once, against float, records as streamed";
+    let mut table = scene.table("window_gains", title, Kind::Modelled, |variant| {
         let float = Variant { inertia: variant.inertia, ..FLOAT.default_variant() };
         let bytes = |v: &Variant| StepTraffic::new(v, Records::Streamed, &scene.step).bytes();
         let ms = |v: &Variant, bandwidth| {
@@ -80,53 +79,50 @@ fn gains(scene: &Scene, designs: &[(&Variant, &Window)]) -> Table {
             Cell::Number(mib(memory.block_ram()), 2)
         };
         let ratio = bytes(&float) as f64 / bytes(variant).max(1) as f64;
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("bytes", "bytes a step", Cell::Whole(bytes(variant))),
-            ("float_bytes", "float's", Cell::Whole(bytes(&float))),
+        [[
+            ("bytes", "bytes a step", whole(bytes(variant))),
+            ("float_bytes", "float's", whole(bytes(&float))),
             ("bytes_ratio", "a fraction of", text(format!("1/{ratio:.2}"))),
             ("ms_unlimited", "ms", ms(variant, Bandwidth::Unlimited)),
             ("ms_sustained", "ms at 12.8 GB/s", ms(variant, Bandwidth::ZCU102_SUSTAINED)),
             ("float_ms_sustained", "float's", ms(&float, Bandwidth::ZCU102_SUSTAINED)),
             ("mib", "MiB on chip", on_chip(variant)),
             ("float_mib", "float's", on_chip(&float)),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
-    }
+        ]]
+    });
     table.note(
         "Memory on chip does not depend on the scene: delay lines and places have a fixed size.",
     );
     table
 }
 
-fn logic(designs: &[(&Variant, &Window)]) -> Table {
-    let mut table = Table::new(
-        "window_logic",
-        "Collisions streamed once: logic, percent of the XCZU9EG, extrapolated from the thesis",
-    );
-    for (variant, _) in designs {
-        let Some(logic) = WindowLogic::new(variant) else { continue };
-        table.row([
-            ("profile", "profile", text(variant.profile.name)),
-            ("from", "from", text(format!("{} {}", logic.from.profile.name, logic.from.results))),
-            ("units", "units of a kind", Cell::Whole(logic.units.into())),
-            ("dsp", "DSP", Cell::Share(logic.dsp.into())),
-            ("flip_flops", "flip-flops", Cell::Share(logic.flip_flops.into())),
-            ("lookup_tables", "lookup tables", Cell::Share(logic.lookup_tables.into())),
-            ("fits", "fits", text(yes_or_no(logic.fits()))),
-            ("kind", "kind", Kind::Modelled.cell()),
-        ]);
-        let left = 100_u32.saturating_sub(logic.lookup_tables);
-        table.note(if logic.fits() {
-            format!(
-                "{}: {left} % of the lookup tables are left for places, scoreboard, delay lines \
-                 and DMAs, which this table does not count. Only a synthesis can tell whether that \
-                 is enough, and whether it closes timing.",
-                variant.profile.name
-            )
-        } else {
-            format!("{}: more than the device has. It does not fit.", variant.profile.name)
-        });
+fn logic(scene: &Scene) -> Table {
+    let title =
+        "Collisions streamed once: logic, percent of the XCZU9EG, extrapolated from the thesis";
+    let mut table = scene.table("window_logic", title, Kind::Modelled, |variant| {
+        Window::of(variant.profile).map(|design| {
+            let (from, logic) = design.logic(variant);
+            let [dsp, flip_flops, lookup_tables] = logic.map(|percent| Cell::Share(percent.into()));
+            [
+                ("from", "from", text(format!("{} {}", from.profile.name, from.results))),
+                ("units", "units of a kind", whole(design.units)),
+                ("dsp", "DSP", dsp),
+                ("flip_flops", "flip-flops", flip_flops),
+                ("lookup_tables", "lookup tables", lookup_tables),
+                ("fits", "fits", yes_or_no(logic.iter().all(|percent| *percent <= 100))),
+            ]
+        })
+    });
+    for variant in &scene.variants {
+        let Some(design) = Window::of(variant.profile) else { continue };
+        let (_, [.., lookup_tables]) = design.logic(variant);
+        table.note(format!(
+            "{}: {} % of the lookup tables are left for places, scoreboard, delay lines and DMAs, \
+             which this table does not count. Only a synthesis can tell whether that is enough, \
+             and whether it closes timing.",
+            variant.profile.name,
+            100 - lookup_tables
+        ));
     }
     table.note(
         "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one \

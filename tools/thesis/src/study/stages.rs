@@ -33,8 +33,7 @@ const SIDE: u16 = 4;
 /// Draws a step of the pile on a board; also its cycles.
 fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u64)> {
     let grid = Grid::new(SIDE, SIDE, SIDE).map_err(Failure::input)?;
-    let mut scene = Scene::new(&SceneOptions { grid, drop: DROP, ..SceneOptions::default() })
-        .map_err(Failure::input)?;
+    let mut scene = Scene::new(&SceneOptions { grid, drop: DROP }).map_err(Failure::input)?;
     let build = Build { profile: Some(profile), ..Build::default() };
     let mut opened = board::open(common, &build)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;

@@ -2,7 +2,6 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command line tool")]
 
 use std::error::Error;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -36,13 +35,6 @@ struct Args {
     /// Physical address of the mailbox page.
     #[arg(long, value_name = "ADDRESS", value_parser = number)]
     mailbox: u64,
-    /// Memory that the device may access; can be repeated [default: the memory that the interface
-    /// reserves]
-    #[arg(long, value_name = "ADDRESS+BYTES", value_parser = range)]
-    grant: Vec<Range<u64>>,
-    /// The interrupt (SPI), as the device tree counts
-    #[arg(long, value_name = "NUMBER", default_value_t = INTERRUPT_SPI)]
-    spi: u32,
     /// Simulator of the generated Verilog, the accelerator in place of the model;
     /// `rtlgen simulator` builds one
     #[arg(long, value_name = "PATH")]
@@ -58,13 +50,6 @@ fn number(text: &str) -> Result<u64, String> {
         None => text.parse(),
     };
     parsed.map_err(|_| format!("expected a number like 0x30000000, found {text:?}"))
-}
-
-fn range(text: &str) -> Result<Range<u64>, String> {
-    let wrong = || format!("expected a range like 0x30000000+0x1000000, found {text:?}");
-    let (start, bytes) = text.split_once('+').ok_or_else(wrong)?;
-    let (start, bytes) = (number(start)?, number(bytes)?);
-    Ok(start..start.checked_add(bytes).ok_or_else(wrong)?)
 }
 
 fn main() -> ExitCode {
@@ -97,15 +82,12 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let (config, accelerator) = design(args.simulator.as_deref())?;
     let limit = Duration::from_secs(args.limit);
     // QEMU answers once its machine exists, and with it the memory.
-    let line = QtestLine::connect(&args.qtest, args.spi, limit.min(START_LIMIT))
+    let line = QtestLine::connect(&args.qtest, INTERRUPT_SPI, limit.min(START_LIMIT))
         .map_err(|error| format!("{}: {error}", args.qtest.display()))?;
     let memory = GuestFile::open(&args.memory)
         .map_err(|error| format!("{}: {error}", args.memory.display()))?;
     let page = memory.page(args.mailbox)?;
-    let mut granted = args.grant.clone();
-    if granted.is_empty() {
-        granted.push(MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES);
-    }
+    let granted = std::iter::once(MEMORY_BASE..MEMORY_BASE + MEMORY_BYTES).collect();
     let board = EmulatedBoard::on_memory(config, Box::new(memory), granted, accelerator)?;
     let ended = Server::new(board.clone(), page, line)?.serve(limit);
 
@@ -132,18 +114,4 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     ended.map_err(Box::<ServeError>::new)?;
     let good = counts.violations == 0 && dead.is_none();
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_are_addresses_and_lengths() {
-        assert_eq!(range("0x30000000+0x1000"), Ok(0x3000_0000..0x3000_1000));
-        assert_eq!(range("16+16"), Ok(16..32));
-        for wrong in ["", "0x10", "0x10+", "a+1", "0xffffffffffffffff+2"] {
-            assert!(range(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -82,11 +82,8 @@ impl Machine for Board {
 fn main() -> ExitCode {
     let ran = Board::open().map_err(one_cube::StepError::Machine);
     match ran.and_then(|mut board| one_cube::run(&mut board, PATIENCE)) {
-        Ok(done) => {
-            println!(
-                "ok one cube through UIO: Bullet's bits, {} interrupt, {} cycles",
-                done.interrupts, done.cycles
-            );
+        Ok(cycles) => {
+            println!("ok one cube through UIO: Bullet's bits, 1 interrupt, {cycles} cycles");
             ExitCode::SUCCESS
         }
         Err(error) => {

@@ -51,17 +51,14 @@ fn a_firmware_folder_behind_a_link_is_the_firmware_folder() {
 }
 
 #[test]
-fn a_partial_bitstream_sets_the_flag_or_is_refused_without_one() {
+fn the_flag_of_a_partial_bitstream_is_cleared_and_a_manager_without_flags_loads_too() {
     let kernel = FakeKernel::vendor();
-    let partial = |kernel: &FakeKernel| Request { partial: true, ..request(&kernel.installed()) };
-    kernel.ask(&partial(&kernel)).expect("loaded");
-    assert_eq!(kernel.written()[0], pair("sys/class/fpga_manager/fpga0/flags", "1"));
+    kernel.load(&kernel.installed(), false).expect("loaded");
+    assert_eq!(kernel.written()[0], pair("sys/class/fpga_manager/fpga0/flags", "0"));
 
     let kernel = FakeKernel::vendor();
     kernel.remove("sys/class/fpga_manager/fpga0/flags");
-    let error = kernel.ask(&partial(&kernel)).expect_err("refused");
-    assert_refused(&kernel, &error, "no file \"flags\"", "without --partial");
-    kernel.load(&kernel.installed(), false).expect("a full one needs no flags");
+    kernel.load(&kernel.installed(), false).expect("loaded");
 }
 
 #[test]

@@ -33,7 +33,6 @@ pub(super) fn request(bitstream: &Path) -> Request {
     Request {
         bitstream: bitstream.to_owned(),
         overlay: None,
-        partial: false,
         part: Chip::of(0x0473_8093),
         unjudged: false,
         manager: ManagerChoice::Automatic,

@@ -163,7 +163,7 @@ impl State {
     /// A pile of cubes some steps after its drop, on a board without faults.
     fn settled(side: u16, config: BoardConfig, start: Start) -> Result<Self> {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
-        let options = SceneOptions { grid, drop: 0.05, ..SceneOptions::default() };
+        let options = SceneOptions { grid, drop: 0.05 };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
         let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
         let parameters = start.parameters();

@@ -12,7 +12,7 @@ use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
 use zynq_pgs_view::{ViewError, gltf, npz};
 
-use super::film::{Film, Rhythm};
+use super::film::Film;
 use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
 use pgs_command::output::files::{Named, check_folder, unwritten};
@@ -24,7 +24,8 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the arrays.
+    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the
+    /// arrays.
     #[arg(
         long,
         value_name = "FILE.npz|glb",
@@ -56,15 +57,6 @@ pub(crate) struct FileArgs {
         value_parser = clap::value_parser!(u32).range(1..)
     )]
     frames: Option<u32>,
-    /// Record N frames a simulated second, with poses between two steps where a frame lies between
-    /// them
-    #[arg(
-        long,
-        value_name = "N",
-        conflicts_with_all = ["every", "frames"],
-        value_parser = clap::value_parser!(u16).range(1..=1000)
-    )]
-    frames_per_second: Option<u16>,
 }
 
 fn extension(path: &Path) -> &str {
@@ -92,11 +84,7 @@ impl Unfit {
     fn failure(path: &Path, source: ViewError) -> Failure {
         let is_size = matches!(source, ViewError::TooLarge(_));
         let failure = Failure::input(Self { path: path.to_owned(), source });
-        if is_size {
-            failure.next("give --every, --frames or --frames-per-second with fewer frames")
-        } else {
-            failure
-        }
+        if is_size { failure.next("give --every or --frames with fewer frames") } else { failure }
     }
 }
 
@@ -122,12 +110,8 @@ impl FileArgs {
         if self.poses.is_none() && self.view.is_none() {
             return Ok(None);
         }
-        let rhythm = match (self.frames_per_second, self.every) {
-            (Some(frames), _) => Rhythm::in_time(frames, time_step, scene),
-            (None, Some(every)) => Rhythm::Steps(every),
-            (None, None) => Rhythm::Steps(steps.div_ceil(self.frames.unwrap_or(FRAMES)).max(1)),
-        };
-        Film::new(scene, rhythm, time_step).map(Some)
+        let every = steps.div_ceil(self.frames.unwrap_or(FRAMES)).max(1);
+        Film::new(scene, self.every.unwrap_or(every), time_step).map(Some)
     }
 
     /// Writes the picture of a scene.

@@ -58,7 +58,6 @@ Examples:
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
   pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
-  pgs run --view pile.html --frames-per-second 25    frames between two steps, for a film
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the

@@ -13,6 +13,7 @@ use zynq_pgs::interface::profile::Profile;
 use zynq_pgs::report::Limit;
 
 use super::row::Row;
+use crate::a53::HostTimes;
 use pgs_command::numbers::grouped;
 use pgs_command::options::solver::time_step_text;
 use pgs_command::output::facts::fact;
@@ -38,6 +39,8 @@ pub(super) struct Totals {
     /// The number of steps that each limit held back.
     limits: Vec<(Limit, u32)>,
     host: HostSums,
+    /// The host's time on the processor of a ZCU102, if that of all steps is counted.
+    a53: Option<HostTimes>,
 }
 
 /// Host time by activity.
@@ -55,6 +58,8 @@ impl Totals {
     /// Adds a step.
     pub(super) fn add(&mut self, row: &Row) {
         let report = &row.report;
+        let before = if self.steps == 0 { Some(HostTimes::default()) } else { self.a53 };
+        self.a53 = before.zip(row.a53).map(|(sum, step)| sum.and(step));
         self.steps += 1;
         self.collisions_most = self.collisions_most.max(report.collisions);
         self.modelled += report.modelled_time();
@@ -230,6 +235,10 @@ impl<'a> Summary<'a> {
     pub(super) fn print(&self, out: &mut dyn Write) -> io::Result<()> {
         fact(out, "simulated", &self.simulated())?;
         fact(out, "time", &self.board_times())?;
+        if let Some(a53) = &self.totals.a53 {
+            // The label's column ends within the words.
+            fact(out, "host on an", &a53.text(self.totals.steps, self.totals.mean()))?;
+        }
         if let Some(thesis) = self.thesis() {
             fact(out, "thesis", &thesis.text(self.totals.passes))?;
         }

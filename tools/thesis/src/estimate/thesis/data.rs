@@ -7,20 +7,7 @@
 const WORD_BYTES: u64 = 4;
 const WORDS_PER_BEAT: u64 = 4;
 
-/// The figures that the thesis prints in a row.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Printed {
-    /// Words of one record, "per collision" or "per iteration".
-    pub each: u32,
-    /// Words in total.
-    pub words: u64,
-    /// Memory footprint in total, hundredths of a MiB.
-    pub centi_mebibytes: u64,
-    /// Stream accesses of 128 bits in total.
-    pub beats: u64,
-}
-
-/// A row: one state of the reduction.
+/// A row: one state of the reduction, and the figures that the thesis prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataRow {
     /// Name of the state.
@@ -29,8 +16,14 @@ pub struct DataRow {
     pub per_collision: u32,
     /// Words a body that the total counts.
     pub per_body: u32,
-    /// The figures that the thesis prints.
-    pub printed: Printed,
+    /// Printed: words of one record, "per collision" or "per iteration".
+    pub each: u32,
+    /// Printed: words in total.
+    pub total: u64,
+    /// Printed: memory footprint in total, hundredths of a MiB.
+    pub centi_mebibytes: u64,
+    /// Printed: stream accesses of 128 bits in total.
+    pub accesses: u64,
 }
 
 /// A table.
@@ -47,17 +40,16 @@ pub struct DataTable {
 }
 
 impl DataRow {
-    /// Words in total. Counts beyond 64 bits saturate.
+    /// Words in total.
     #[must_use]
     pub const fn words(&self, bodies: u64, collisions: u64) -> u64 {
-        let bodies = bodies.saturating_mul(self.per_body as u64);
-        collisions.saturating_mul(self.per_collision as u64).saturating_add(bodies)
+        collisions * self.per_collision as u64 + bodies * self.per_body as u64
     }
 
     /// Bytes in total.
     #[must_use]
     pub const fn bytes(&self, bodies: u64, collisions: u64) -> u64 {
-        self.words(bodies, collisions).saturating_mul(WORD_BYTES)
+        self.words(bodies, collisions) * WORD_BYTES
     }
 
     /// Stream accesses of 128 bits in total.
@@ -77,12 +69,11 @@ const fn row(
     per_collision: u32,
     per_body: u32,
     each: u32,
-    words: u64,
+    total: u64,
     centi_mebibytes: u64,
-    beats: u64,
+    accesses: u64,
 ) -> DataRow {
-    let printed = Printed { each, words, centi_mebibytes, beats };
-    DataRow { name, per_collision, per_body, printed }
+    DataRow { name, per_collision, per_body, each, total, centi_mebibytes, accesses }
 }
 
 /// Tables 4.1 to 4.6.
@@ -191,8 +182,8 @@ mod tests {
         ];
         assert_eq!(accesses, expected);
         for row in TABLES.iter().flat_map(|table| table.rows) {
-            assert_eq!(row.words(BODIES, COLLISIONS), row.printed.words);
-            assert_eq!(row.beats(BODIES, COLLISIONS), row.printed.beats);
+            assert_eq!(row.words(BODIES, COLLISIONS), row.total);
+            assert_eq!(row.beats(BODIES, COLLISIONS), row.accesses);
         }
     }
 
@@ -204,7 +195,7 @@ mod tests {
             .flat_map(|table| table.rows.iter().map(move |row| (table.id, row)))
             .filter_map(|(id, row)| {
                 let rounded = (row.bytes(BODIES, COLLISIONS) * 100 + (1 << 19)) >> 20;
-                let printed = row.printed.centi_mebibytes;
+                let printed = row.centi_mebibytes;
                 (rounded != printed).then_some((id, row.name, rounded, printed))
             })
             .collect();
@@ -218,7 +209,7 @@ mod tests {
             let (pgs, integration) = (pgs[row.min(1)], integration[row]);
             assert_eq!(both[row].per_collision, pgs.per_collision + integration.per_collision);
             assert_eq!(both[row].per_body, pgs.per_body + integration.per_body);
-            assert_eq!(both[row].printed.each, pgs.printed.each + integration.printed.each);
+            assert_eq!(both[row].each, pgs.each + integration.each);
         }
     }
 

@@ -146,7 +146,7 @@ fn measure(options: &Options, session: &Session) -> Result<Part> {
 
 fn scene(options: &Options) -> Result<Scene> {
     let Options { grid, drop, .. } = *options;
-    Scene::new(&SceneOptions { grid, drop, ..SceneOptions::default() }).map_err(Failure::input)
+    Scene::new(&SceneOptions { grid, drop }).map_err(Failure::input)
 }
 
 /// A pile's measures, and its positions at the end.

@@ -1,3 +1,0 @@
-//! The target `answers` for libFuzzer.
-#![no_main]
-include!("run.rs");

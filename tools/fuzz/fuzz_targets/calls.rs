@@ -1,3 +1,0 @@
-//! The target `calls` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `chains` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `confinement` for libFuzzer.
-#![no_main]
-include!("run.rs");

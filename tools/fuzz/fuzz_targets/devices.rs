@@ -1,3 +1,0 @@
-//! The target `devices` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `faults` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `folders` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `loads` for libFuzzer.
-#![no_main]
-include!("run.rs");

@@ -1,3 +1,0 @@
-//! The target `packets` for libFuzzer.
-#![no_main]
-include!("run.rs");

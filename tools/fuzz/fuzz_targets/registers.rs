@@ -1,3 +1,0 @@
-//! The target `registers` for libFuzzer.
-#![no_main]
-include!("run.rs");

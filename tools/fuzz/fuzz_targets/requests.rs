@@ -1,3 +1,0 @@
-//! The target `requests` for libFuzzer.
-#![no_main]
-include!("run.rs");
