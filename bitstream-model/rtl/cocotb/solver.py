@@ -343,11 +343,12 @@ class Issue:
     def by_queue(self):
         count = len(self.step.collisions)
         queue, coming = list(range(min(spec.QUEUE, count))), min(spec.QUEUE, count)
-        patience = 0
+        patience = 0  # slots in which the oldest one did not issue
         while queue:
             oldest = queue[0]
             free = [index for index in queue if self.is_free(index)]
-            self.met.update(set(queue) - set(free))
+            if patience == 0 and oldest not in free:
+                self.met.add(oldest)
             if patience >= 4 * self.window:
                 free = [index for index in free if index == oldest or not self.moving(index) & self.moving(oldest)]
             patience += 1
