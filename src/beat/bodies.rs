@@ -43,6 +43,22 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
     (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
     packers: &mut PackPool,
 ) -> (u32, u32, bool) {
+    let work = |part: Part<'_>| pack_range(bodies, part);
+    pack_parts(target, count, into, (velocities, poses), packers, &work)
+}
+
+/// A range of bodies, their ends, and their packer.
+type Part<'a> = (Range<usize>, &'a mut [End], BodyPacker<'a>);
+
+/// [`pack_bodies`] by the work on each range.
+fn pack_parts(
+    target: Target<'_>,
+    count: usize,
+    into: Survey<'_>,
+    (velocities, poses): (&mut [&mut [Beat]], &mut [&mut [Beat]]),
+    packers: &mut PackPool,
+    work: &(dyn Fn(Part<'_>) -> ([u32; 2], bool) + Sync),
+) -> (u32, u32, bool) {
     let (mut sums, mut good) = ([0_u32; 2], true);
     let ends = into.ends.anew(count);
     let (velocities, poses) = (whole(velocities), whole(poses));
@@ -56,7 +72,6 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
             (range, ends, BodyPacker::new(target, velocities.cut(), poses.cut()))
         })
     };
-    let work = |(range, ends, packer): (_, &mut [End], _)| pack_range(bodies, range, ends, packer);
     packers.each(count, cut, work, |(of_range, also): ([u32; 2], bool)| {
         sums = [sums[0].wrapping_add(of_range[0]), sums[1].wrapping_add(of_range[1])];
         good &= also;
@@ -70,11 +85,10 @@ pub(crate) fn pack_bodies<B: Bodies + ?Sized>(
 /// all bodies.
 ///
 /// Only this function depends on the caller's container: it finds where the bodies of a block lie.
+#[inline]
 fn pack_range<B: Bodies + ?Sized>(
     bodies: &B,
-    range: Range<usize>,
-    ends: &mut [End],
-    mut packer: BodyPacker<'_>,
+    (range, ends, mut packer): Part<'_>,
 ) -> ([u32; 2], bool) {
     let mut copies = [NOBODY; BLOCK];
     for (first, ends) in range.step_by(BLOCK).zip(ends.chunks_mut(BLOCK)) {

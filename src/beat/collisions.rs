@@ -76,21 +76,36 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
     warm: Option<WarmSegments<'_>>,
     packers: &mut PackPool,
 ) -> Packed {
-    let scene = target.scene;
+    let work = |part: Part<'_>| pack_range(entries, part);
+    let Entries { count, added, .. } = *entries;
+    let mut packed = pack_parts((target.scene, ends), count, channels, warm, packers, &work);
+    packed.good &= added.is_none_or(|added| added == packed.paddings);
+    packed
+}
+
+/// A range of entries, and their packer.
+type Part<'a> = (Range<usize>, CollisionPacker<'a>);
+
+/// [`pack_collisions`] by the work on each range.
+fn pack_parts<'a>(
+    (scene, ends): (&'a Scene<'a>, Ends<'a>),
+    count: usize,
+    channels: &'a mut [&mut [Beat]],
+    mut warm: Option<WarmSegments<'a>>,
+    packers: &mut PackPool,
+    work: &(dyn Fn(Part<'a>) -> Packed + Sync),
+) -> Packed {
     let mut packed = Packed::NOTHING;
     let channels = whole(channels);
     let cut = |size| {
         let layout = Segment::Collisions.layout(scene.variant);
         let mut pieces = ChannelChunks::new(&layout, size, channels);
-        let mut warm = warm;
-        ranges(entries.count, size).map(move |range| {
+        ranges(count, size).map(move |range| {
             let warm = warm.as_mut().map(|warm| warm.cut(scene.variant, size));
             (range, CollisionPacker::new(scene, ends, pieces.cut(), warm))
         })
     };
-    let work = |(range, packer)| pack_range(entries, range, packer);
-    packers.each(entries.count, cut, work, |of_range| packed = packed.and(of_range));
-    packed.good &= entries.added.is_none_or(|added| added == packed.paddings);
+    packers.each(count, cut, work, |of_range| packed = packed.and(of_range));
     packed
 }
 
@@ -101,13 +116,11 @@ pub(crate) fn pack_collisions<C: Collisions + ?Sized>(
 /// structures is not `count`.
 fn pack_range<C: Collisions + ?Sized>(
     entries: &Entries<'_, C>,
-    range: Range<usize>,
-    mut packer: CollisionPacker<'_>,
+    (range, mut packer): Part<'_>,
 ) -> Packed {
     let Entries { collisions, count, .. } = *entries;
     let lying = collisions.structures().filter(|all| all.len() == count);
     let mut copies = [Collision::NOTHING; BLOCK];
-    let mut impulses = [Impulses::ZERO; BLOCK];
     for first in range.clone().step_by(BLOCK) {
         let block = first..range.end.min(first + BLOCK);
         match lying {
@@ -124,11 +137,9 @@ fn pack_range<C: Collisions + ?Sized>(
                 packer.write(&copies, &IN_ARRAY, block.len());
             }
         }
-        if packer.warm.is_some() {
-            let impulses = &mut impulses[..block.len()];
-            impulses.iter_mut().zip(block).for_each(|(to, index)| *to = collisions.impulses(index));
-            packer.write_impulses(impulses);
-        }
+        packer.write_impulses(block.len(), |at, normal, points| {
+            collisions.impulses(first + at, normal, points)
+        });
     }
     packer.finish()
 }
@@ -240,8 +251,14 @@ impl<'a> CollisionPacker<'a> {
             paddings += usize::from(padding);
         }
         good &= largest.are_within(scene.held.collisions.largest());
-        if scene.computes_short_rows() {
-            good &= places[..count].iter().all(|place| scene.rows_fit(at(all, *place), ends));
+        if let Some(bounds) = &scene.short_rows {
+            let mut positions = Magnitudes::default();
+            for rows in &self.rows[..count] {
+                positions.see(rows[collision::BODY_A]);
+                positions.see(rows[collision::BODY_B]);
+            }
+            good &= bounds.all_fit(largest, positions)
+                || places[..count].iter().all(|place| scene.rows_fit(at(all, *place), ends));
         }
         self.good &= good;
         self.paddings += paddings;
@@ -252,23 +269,30 @@ impl<'a> CollisionPacker<'a> {
         dealer.write(beats);
     }
 
-    /// Writes the impulses of the collisions that were written last.
-    pub(crate) fn write_impulses(&mut self, impulses: &[Impulses]) {
+    /// Writes the impulses of the `count` collisions that were written last: `impulses` has them, by
+    /// the place of a collision among these, its normal and number of points.
+    #[inline]
+    fn write_impulses(
+        &mut self,
+        count: usize,
+        impulses: impl Fn(usize, [f32; 3], u32) -> Impulses,
+    ) {
         let Self { warm: Some(warm), dealer, rows, halves, beats, .. } = self else { return };
+        warm.take(&rows[..count], impulses);
         let all = match dealer.layout.format {
             StreamFormat::F32 => rows.as_flattened(),
             StreamFormat::Binary16 => halves.as_flattened(),
         };
-        warm.write(&all[..*beats], rows, impulses);
+        warm.write(&all[..*beats], count);
     }
 
     /// Ends the segments.
-    pub(crate) fn finish(self) -> Packed {
-        let Self { dealer, warm, good, paddings, .. } = self;
-        let limit = self.scene.held.impulses.largest();
-        let good = good && warm.as_ref().is_none_or(|warm| warm.are_within(limit));
-        let warm = warm.map_or(WarmSums::NONE, |warm| warm.sums());
-        Packed { sum: dealer.sum(), warm, good, paddings }
+    pub(crate) fn finish(&self) -> Packed {
+        let Self { scene, dealer, warm, good, paddings, .. } = self;
+        let limit = scene.held.impulses.largest();
+        let good = *good && warm.as_ref().is_none_or(|warm| warm.are_within(limit));
+        let warm = warm.as_ref().map_or(WarmSums::NONE, WarmDealer::sums);
+        Packed { sum: dealer.sum(), warm, good, paddings: *paddings }
     }
 }
 

@@ -5,7 +5,7 @@
 //! The other channels have the same beats in every pass.
 
 use pgs_interface::profile::Variant;
-use pgs_interface::record::{Beat, WORD_LANE, collision};
+use pgs_interface::record::{Beat, LANES, collision};
 use pgs_interface::stripe::Stripe;
 
 use super::deal::Share;
@@ -13,7 +13,7 @@ use super::format::beats_of;
 use super::pool::Stretch as _;
 use super::stripe::{BLOCK, Layout, Segment};
 use crate::record::Magnitudes;
-use crate::record::collision::{and, used, used_lanes};
+use crate::record::collision::{and, used_lanes};
 use crate::scene::Impulses;
 use crate::simd::Sum;
 
@@ -74,10 +74,11 @@ pub(crate) struct WarmDealer<'a> {
     /// The places of this channel's beats among them.
     share: Share,
     sums: [Sum; 2],
-    largest: Magnitudes,
-    /// The rows of a block's impulses of either kind, and the beats of one kind in sixteen bits.
+    /// Of either kind.
+    largest: [Magnitudes; 2],
+    /// The rows of a block's impulses of either kind, and their beats in sixteen bits.
     kinds: [[[Beat; 1]; BLOCK]; 2],
-    halves: [Beat; BLOCK.div_ceil(2)],
+    halves: [[Beat; BLOCK.div_ceil(2)]; 2],
 }
 
 impl<'a> WarmDealer<'a> {
@@ -95,42 +96,53 @@ impl<'a> WarmDealer<'a> {
             issue,
             share,
             sums: [Sum::default(); 2],
-            largest: Magnitudes::default(),
+            largest: [Magnitudes::default(); 2],
             kinds: [[[Beat::default()]; BLOCK]; 2],
-            halves: [Beat::default(); BLOCK.div_ceil(2)],
+            halves: [[Beat::default(); BLOCK.div_ceil(2)]; 2],
         }
     }
 
-    /// Writes the next collisions: their beats, as in every pass, and behind each issue a beat of
-    /// impulses. `records` are the rows of the collisions.
-    pub(super) fn write(
+    /// Makes the rows of the impulses of the next collisions, whose records have these rows.
+    #[inline]
+    pub(super) fn take(
         &mut self,
-        beats: &[Beat],
         records: &[[Beat; collision::ROWS]],
-        impulses: &[Impulses],
+        impulses: impl Fn(usize, [f32; 3], u32) -> Impulses,
     ) {
-        let Self { segments, layout, issue, share, sums, largest, kinds, halves } = self;
-        let [contact, friction] = &mut *kinds;
-        let rows = contact.iter_mut().zip(friction);
-        for (([normal], [tangential]), (of, record)) in rows.zip(impulses.iter().zip(records)) {
-            [*normal, *tangential] = rows_of(of, record[collision::NORMAL].0[WORD_LANE]);
-            largest.see(*normal);
-            largest.see(*tangential);
+        let [contact, friction] = &mut self.kinds;
+        let [mut of_contact, mut of_friction] = self.largest;
+        let rows = records.iter().zip(contact.iter_mut().zip(friction));
+        for (at, (record, ([normal], [tangential]))) in rows.enumerate() {
+            let [x, y, z, count] = record[collision::NORMAL].0;
+            let points = count & !collision::FRICTION_BITS;
+            let impulses = impulses(at, [x, y, z].map(f32::from_bits), points);
+            [*normal, *tangential] = rows_of(&impulses, count);
+            of_contact.see(*normal);
+            of_friction.see(*tangential);
         }
-        let segments = [&mut segments.contact, &mut segments.friction];
-        for ((rows, segment), sum) in kinds.iter_mut().zip(segments).zip(sums) {
-            let added = beats_of(layout, (rows, impulses.len()), &[], halves);
-            let beats = (beats, *issue);
-            match *share.places() {
-                [place] => add(segment, beats, &[place], added, sum),
-                _ => add(segment, beats, share.places(), added, sum),
-            }
+        self.largest = [of_contact, of_friction];
+    }
+
+    /// Writes the `count` collisions whose rows were made: their beats, as in every pass, and
+    /// behind each issue a beat of impulses.
+    pub(super) fn write(&mut self, beats: &[Beat], count: usize) {
+        let Self { segments, layout, issue, share, sums, kinds, halves, .. } = self;
+        let [contact, friction] = kinds;
+        let [of_contact, of_friction] = halves;
+        let added = [
+            beats_of(layout, (contact, count), &[], of_contact),
+            beats_of(layout, (friction, count), &[], of_friction),
+        ];
+        let beats = (beats, *issue);
+        match *share.places() {
+            [place] => add(segments, beats, &[place], added, sums),
+            _ => add(segments, beats, share.places(), added, sums),
         }
     }
 
     /// Whether all impulses are numbers of at most this magnitude.
     pub(super) fn are_within(&self, limit: f32) -> bool {
-        self.largest.are_within(limit)
+        self.largest.iter().all(|largest| largest.are_within(limit))
     }
 
     pub(super) fn sums(&self) -> WarmSums {
@@ -143,35 +155,56 @@ impl<'a> WarmDealer<'a> {
 /// zeros: the caller may leave anything there.
 #[inline(always)]
 fn rows_of(impulses: &Impulses, count: u32) -> [Beat; 2] {
-    let points = count & !collision::FRICTION_BITS;
-    let [first, second] = impulses.friction.map(f32::to_bits);
+    let used = used_lanes(count);
+    let [first, second] = impulses.friction;
     let normal = Beat(impulses.normal.map(f32::to_bits));
-    let tangential = Beat([first, second, 0, 0]);
-    [and(normal, used_lanes(points)), and(tangential, &used(points)[0])]
+    let tangential = Beat([first.to_bits(), second.to_bits(), 0, 0]);
+    [and(normal, used), and(tangential, &Beat([used.0[0]; LANES]))]
 }
 
-/// Writes the beats at these places of each issue to a segment, and behind them the added one.
+/// Writes the beats at these places of each issue to both segments, and behind them the added one.
 #[inline(always)]
 fn add(
-    segment: &mut &mut [Beat],
+    segments: &mut WarmSegments<'_>,
     (beats, issue): (&[Beat], usize),
     places: &[usize],
-    added: &[Beat],
-    sum: &mut Sum,
+    added: [&[Beat]; 2],
+    sums: &mut [Sum; 2],
 ) {
     let each = places.len() + 1;
-    if places.iter().any(|place| *place >= issue) || segment.is_empty() {
+    if places.iter().any(|place| *place >= issue) {
         return;
     }
-    let (to, behind) = std::mem::take(segment).parted(added.len() * each);
-    let mut all = *sum;
-    for ((to, beats), added) in to.chunks_exact_mut(each).zip(beats.chunks_exact(issue)).zip(added)
-    {
+    let write = |to: &mut [Beat], beats: &[Beat], added: &Beat, sum: &mut Sum| {
         for (to, place) in to.iter_mut().zip(places) {
             *to = beats[*place];
         }
         to[places.len()] = *added;
-        all.add(*added);
+        sum.add(*added);
+    };
+    let length = added[0].len() * each;
+    let WarmSegments { contact, friction, .. } = segments;
+    let ((contact, rest), (tangential, behind)) =
+        (std::mem::take(contact).parted(length), std::mem::take(friction).parted(length));
+    (segments.contact, segments.friction) = (rest, behind);
+    let [contact, friction] = [contact, tangential].map(|to| to.chunks_exact_mut(each));
+    let mut all = *sums;
+    let [in_contact, in_friction] = &mut all;
+    let beats = beats.chunks_exact(issue);
+    if contact.len() == friction.len() {
+        let added = added[0].iter().zip(added[1]);
+        for (((first, second), beats), added) in contact.zip(friction).zip(beats).zip(added) {
+            write(first, beats, added.0, in_contact);
+            write(second, beats, added.1, in_friction);
+        }
+    } else {
+        // A kind without passes has no segment.
+        let kinds = [(contact, added[0], in_contact), (friction, added[1], in_friction)];
+        for (segment, added, sum) in kinds {
+            for ((to, beats), added) in segment.zip(beats.clone()).zip(added) {
+                write(to, beats, added, sum);
+            }
+        }
     }
-    (*segment, *sum) = (behind, all);
+    *sums = all;
 }

@@ -167,7 +167,7 @@ impl<'a> Writer<'a> {
             Some(refused) => Err(refused),
             None => {
                 let Self { done: collisions, packer, .. } = self;
-                let packed = packer.map(CollisionPacker::finish);
+                let packed = packer.as_ref().map(CollisionPacker::finish);
                 let (sum, paddings) =
                     packed.map_or((0, collisions), |packed| (packed.sum, packed.paddings));
                 Ok(Written { sum, collisions, paddings })

@@ -124,8 +124,9 @@ impl<C: Collisions + ?Sized> Collisions for Ordered<'_, C> {
     }
 
     #[inline]
-    fn impulses(&self, index: usize) -> Impulses {
-        self.schedule.get(index).map_or(Impulses::ZERO, |index| self.collisions.impulses(index))
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        let given = |index| self.collisions.impulses(index, normal, points);
+        self.schedule.get(index).map_or(Impulses::ZERO, given)
     }
 
     fn lengths_agree(&self) -> bool {

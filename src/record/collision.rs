@@ -7,41 +7,44 @@ use super::body_table::End;
 use crate::scene::{Collision, Contact};
 use pgs_interface::record::{Beat, CONTACT_POINTS, LANES, WORD_LANE, collision};
 
-/// Masks of the contact points in use, by their number: in the lanes of one row, and in rows of
-/// their own.
+/// Masks of the contact points in use, by the low bits of their number: in the lanes of one row, and
+/// in rows of their own. Validation refuses numbers above [`FULL`], whatever their masks.
 ///
 /// A look-up instead of branches: counts follow no pattern that a processor can predict.
-const USED_LANES: [Beat; CONTACT_POINTS + 1] = {
-    let mut used = [Beat([0; LANES]); CONTACT_POINTS + 1];
-    let mut count = 1;
-    while count <= CONTACT_POINTS {
-        used[count] = used[count - 1];
-        used[count].0[count - 1] = u32::MAX;
-        count += 1;
+const USED_LANES: [Beat; NUMBERS] = {
+    let mut used = [Beat([0; LANES]); NUMBERS];
+    let mut at = 0;
+    while at < NUMBERS * LANES {
+        let (count, lane) = (at / LANES, at % LANES);
+        used[count].0[lane] = if lane < count { u32::MAX } else { 0 };
+        at += 1;
     }
     used
 };
-const USED: [[Beat; CONTACT_POINTS]; CONTACT_POINTS + 1] = {
-    let mut used = [[Beat([0; LANES]); CONTACT_POINTS]; CONTACT_POINTS + 1];
+const USED: [[Beat; CONTACT_POINTS]; NUMBERS] = {
+    let mut used = [[Beat([0; LANES]); CONTACT_POINTS]; NUMBERS];
     let mut at = 0;
-    while at < CONTACT_POINTS * (CONTACT_POINTS + 1) {
+    while at < NUMBERS * CONTACT_POINTS {
         let (count, point) = (at / CONTACT_POINTS, at % CONTACT_POINTS);
         used[count][point] = Beat([USED_LANES[count].0[point]; LANES]);
         at += 1;
     }
     used
 };
+/// A power of two above all numbers of points that are right: a look-up needs no other check.
+const NUMBERS: usize = 2 * CONTACT_POINTS;
+const _: () = assert!(NUMBERS.is_power_of_two() && (FULL as usize) < NUMBERS);
 
-/// The masks of the first `points` contact points. Validation refuses a number above [`FULL`].
+/// The masks of the first `points` contact points.
 #[inline(always)]
 pub(crate) fn used(points: u32) -> &'static [Beat; CONTACT_POINTS] {
-    &USED[points.min(FULL) as usize]
+    &USED[points as usize % NUMBERS]
 }
 
 /// [`used`] in the lanes of one row.
 #[inline(always)]
 pub(crate) fn used_lanes(points: u32) -> &'static Beat {
-    &USED_LANES[points.min(FULL) as usize]
+    &USED_LANES[points as usize % NUMBERS]
 }
 
 /// The bits that both have.

@@ -33,6 +33,11 @@ impl Magnitudes {
         }
     }
 
+    /// The largest magnitudes of the vec3 of each row.
+    pub(crate) fn vec3(self) -> [f32; 3] {
+        to_vec3(Beat(self.0))
+    }
+
     /// Whether all numbers of all rows are within a limit.
     #[inline(always)]
     pub(crate) fn are_within(&self, limit: f32) -> bool {

@@ -53,9 +53,9 @@ pub trait Collisions: Sync {
 
     /// The impulses with which collision `index` begins in a step with
     /// [`StepParameters::warm_start`](crate::StepParameters::warm_start); `index` is below
-    /// [`len`](Self::len).
-    fn impulses(&self, index: usize) -> Impulses {
-        let _ = index;
+    /// [`len`](Self::len), and the collision has this normal and number of contact points.
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        let _ = (index, normal, points);
         Impulses::ZERO
     }
 }
@@ -131,8 +131,9 @@ impl<C: Collisions + ?Sized> Collisions for &C {
         C::lengths_agree(self)
     }
 
-    fn impulses(&self, index: usize) -> Impulses {
-        C::impulses(self, index)
+    #[inline]
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        C::impulses(self, index, normal, points)
     }
 }
 
@@ -213,7 +214,8 @@ impl<C: Collisions + ?Sized> Collisions for WarmCollisions<'_, C> {
         self.collisions.lengths_agree() && self.impulses.len() == self.collisions.len()
     }
 
-    fn impulses(&self, index: usize) -> Impulses {
+    #[inline]
+    fn impulses(&self, index: usize, _: [f32; 3], _: u32) -> Impulses {
         self.impulses[index]
     }
 }

@@ -29,10 +29,12 @@ impl Impulses {
 
     /// The impulses times a factor. A pile comes to rest sooner with 0.85 of the last step's.
     #[must_use]
+    #[inline]
     pub fn scaled(self, factor: f32) -> Self {
+        let [first, second] = self.friction;
         Self {
             normal: self.normal.map(|impulse| impulse * factor),
-            friction: self.friction.map(|impulse| impulse * factor),
+            friction: [first * factor, second * factor],
         }
     }
 

@@ -20,4 +20,4 @@ pub use parameters::StepParameters;
 pub(crate) use passes::Passes;
 pub use shape::{Shape, ShapeError};
 pub use structures::Structures;
-pub(crate) use tangents::tangents;
+pub(crate) use tangents::{along, in_world};

@@ -9,6 +9,7 @@ use pgs_interface::record::Beat;
 use crate::beat::deal::sum_of_words;
 use crate::board::plan::{NUMBERS_PER_BEAT, Plan};
 use crate::fault::Fault;
+use crate::record::MAGNITUDE;
 use crate::scene::Impulses;
 
 /// The impulses of the collisions of one step.
@@ -58,6 +59,12 @@ impl ImpulsesOut {
             if plan.passes.friction > 0 {
                 let part = parts.next().unwrap_or_default();
                 self.kind(plan, ("friction", part), &collision_of, of_friction)?;
+            }
+            // Without a branch for each, as all are finite.
+            let words: &[u32] = bytemuck::cast_slice(&self.staged);
+            let largest = words.iter().fold(0, |largest, word| largest.max(word & MAGNITUDE));
+            if largest <= f32::MAX.to_bits() {
+                return Ok(());
             }
             let broken = self.staged.iter().position(|impulses| !impulses.are_finite());
             broken.map_or(Ok(()), |collision| Err(Fault::ImpulseNotFinite { collision }))

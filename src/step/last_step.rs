@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::scene::{
-    CONTACT_POINTS, Collision, Collisions, Contact, Impulses, Structures, tangents,
+    CONTACT_POINTS, Collision, Collisions, Contact, Impulses, Structures, along, in_world,
 };
 use crate::simd::prefetch;
 use crate::validate::InputError;
@@ -62,17 +62,24 @@ impl Place {
         if taken == 0 { Self::NEW } else { place }
     }
 
-    /// Whether a step of `limit` collisions had the place, or it is new: new ones count from -1.
-    fn is_of(&self, limit: u32) -> bool {
-        let points = self.points.map(|point| usize::from(point.wrapping_add(1)) <= CONTACT_POINTS);
-        (self.collision.wrapping_add(1) <= limit) & points[0] & points[1] & points[2] & points[3]
+    /// Bits that only a wrong place has: a step of `limit` collisions did not have it, and it is not
+    /// new. Without a branch, so that a loop over it takes several places at a time.
+    #[inline(always)]
+    fn wrong(&self, limit: u32) -> u32 {
+        let points = u32::from_ne_bytes(self.points);
+        // All bits of a byte whose top bit is set: such a point is right if it is 255.
+        let new = (points >> 7 & 0x0101_0101) * 0xFF;
+        let beyond = (points ^ new) & (new | 0xFCFC_FCFC);
+        // New ones count from -1.
+        beyond | u32::from(self.collision.wrapping_add(1) > limit)
     }
 
     /// The refusal of a place that is not of a step of `limit` collisions.
     #[cold]
     fn refuse(&self, index: usize, limit: u32) -> InputError {
         let Self { collision: found, points } = *self;
-        let known = |point: &u8| Self { points: [*point; CONTACT_POINTS], ..Self::NEW }.is_of(0);
+        let known =
+            |point: &u8| Self { points: [*point; CONTACT_POINTS], ..Self::NEW }.wrong(0) == 0;
         match points.iter().position(|point| !known(point)) {
             Some(contact) => {
                 InputError::PointPlace { collision: index, contact, found: points[contact] }
@@ -132,12 +139,55 @@ pub struct LastStep {
 /// A collision of the last step.
 #[derive(Debug, Clone, Copy)]
 struct Kept {
+    impulses: [f32; CONTACT_POINTS],
     normal: [f32; 3],
-    /// The normal impulses of its points, and the 0 of a new point.
-    impulses: [f32; CONTACT_POINTS + 1],
-    friction: [f32; 2],
+    /// Friction as a vector in the world, and along the tangents of the normal. These are no array:
+    /// an array of two goes through a register of integers.
+    on_a: [f32; 3],
+    first: f32,
+    second: f32,
     /// The number of its points.
     points: u32,
+}
+
+impl Kept {
+    #[inline]
+    fn new(impulses: &Impulses, normal: [f32; 3], points: u32) -> Self {
+        let Impulses { normal: impulses, friction: [first, second] } = *impulses;
+        // Without friction it may have no contact points, and so no right normal.
+        let none = (first == 0.0) & (second == 0.0);
+        let on_a = if none { [0.0; 3] } else { in_world(normal, (first, second)) };
+        Self { impulses, normal, on_a, first, second, points }
+    }
+
+    /// The impulses of some of its points, and 0 of a new one.
+    #[inline(always)]
+    fn at(&self, points: [u8; CONTACT_POINTS]) -> [f32; CONTACT_POINTS] {
+        let [a, b, c, d] = self.impulses;
+        points.map(|at| [a, b, c, d, 0.0][usize::from(at).min(CONTACT_POINTS)])
+    }
+
+    /// Friction along the tangents of a normal, with the same vector in the world.
+    #[inline(always)]
+    #[allow(clippy::float_cmp, reason = "equal normals have equal tangents")]
+    fn turned(&self, normal: [f32; 3]) -> (f32, f32) {
+        if normal == self.normal {
+            return (self.first, self.second);
+        }
+        let (first, second) = along(normal, self.on_a);
+        // Where the normal has turned round, bodies A and B have changed places.
+        let ([a, b, c], [x, y, z]) = (self.normal, normal);
+        if (a * x + b * y) + c * z < 0.0 { (-first, -second) } else { (first, second) }
+    }
+
+    /// The share of the friction that the points of a collision of `points` have, at their places.
+    #[cold]
+    #[allow(clippy::cast_precision_loss, reason = "at most four points")]
+    fn share(&self, points: u32, places: [u8; CONTACT_POINTS]) -> f32 {
+        let was = |(at, place): (u32, u8)| (at < points) & (u32::from(place) < self.points);
+        let stayed: u32 = (0..).zip(places).map(|point| u32::from(was(point))).sum();
+        if stayed == self.points { 1.0 } else { stayed as f32 / self.points as f32 }
+    }
 }
 
 impl LastStep {
@@ -165,11 +215,10 @@ impl LastStep {
             return Err(InputError::UnequalLengths { what: "collisions" });
         }
         let limit = u32::try_from(self.kept.len()).unwrap_or(u32::MAX);
-        // Without a branch for each, as all are right.
-        if places.iter().fold(true, |all, place| all & place.is_of(limit)) {
+        if places.iter().fold(0, |all, place| all | place.wrong(limit)) == 0 {
             return Ok(placed);
         }
-        let wrong = places.iter().enumerate().find(|(_, place)| !place.is_of(limit));
+        let wrong = places.iter().enumerate().find(|(_, place)| place.wrong(limit) != 0);
         wrong.map_or(Ok(placed), |(index, place)| Err(place.refuse(index, limit)))
     }
 
@@ -181,6 +230,7 @@ impl LastStep {
     /// [`InputError::OtherImpulses`]: another number of impulses than of collisions, as where the
     /// step did not give any out. [`InputError::UnequalLengths`]: arrays of collisions of other
     /// lengths. What was committed before stays.
+    #[inline(never)]
     pub fn commit<C: Collisions + ?Sized>(
         &mut self,
         collisions: &C,
@@ -193,13 +243,12 @@ impl LastStep {
         if found != expected {
             return Err(InputError::OtherImpulses { found, expected });
         }
-        let kept = |(index, &Impulses { normal: [a, b, c, d], friction }): (usize, &Impulses)| {
-            let collision = collisions.collision(index);
-            let (impulses, points) = ([a, b, c, d, 0.0], collision.points());
-            Kept { normal: collision.normal, impulses, friction, points }
-        };
         self.kept.clear();
-        self.kept.extend(impulses.iter().enumerate().map(kept));
+        self.kept.reserve(impulses.len());
+        for (index, impulses) in impulses.iter().enumerate() {
+            let collision = collisions.collision(index);
+            self.kept.push(Kept::new(impulses, collision.normal, collision.points()));
+        }
         Ok(())
     }
 }
@@ -237,51 +286,24 @@ impl<C: Collisions + ?Sized> Collisions for PlacedCollisions<'_, C> {
         self.collisions.lengths_agree() && self.places.len() == self.collisions.len()
     }
 
-    #[inline]
-    #[allow(clippy::float_cmp, reason = "equal normals have equal tangents")]
-    fn impulses(&self, index: usize) -> Impulses {
-        let Some(Place { collision, points }) = self.places.get(index) else {
+    #[inline(always)]
+    fn impulses(&self, index: usize, normal: [f32; 3], points: u32) -> Impulses {
+        let Some(Place { collision, points: places }) = self.places.get(index) else {
             return Impulses::ZERO;
         };
         let Some(kept) = self.kept.get(*collision as usize) else {
             return Impulses::ZERO;
         };
-        let normal = points.map(|at| kept.impulses[usize::from(at).min(CONTACT_POINTS)]);
-        let new = self.collisions.collision(index);
-        let friction = match new.normal == kept.normal || kept.friction == [0.0; 2] {
-            true => kept.friction,
-            false => turned(kept.friction, kept.normal, new.normal),
-        };
-        Impulses { normal, friction: kept.shares(friction, &new, *points) }.scaled(self.factor)
-    }
-}
-
-impl Kept {
-    /// The shares of the friction that the points of a collision have, at their places.
-    #[allow(clippy::cast_precision_loss, reason = "at most four points")]
-    fn shares(
-        &self,
-        friction: [f32; 2],
-        new: &Collision,
-        places: [u8; CONTACT_POINTS],
-    ) -> [f32; 2] {
-        let was = |(at, place): (u32, u8)| (at < new.points()) & (u32::from(place) < self.points);
-        let stayed: u32 = (0..).zip(places).map(|point| u32::from(was(point))).sum();
-        match stayed == self.points {
-            true => friction,
-            false => friction.map(|impulse| impulse * (stayed as f32 / self.points as f32)),
+        let same = *places == Place::same(0).points;
+        let known = if same { kept.impulses } else { kept.at(*places) };
+        let (first, second) = kept.turned(normal);
+        let mut friction = [first, second];
+        if !same | (points < kept.points) {
+            let share = kept.share(points, *places);
+            friction = [first * share, second * share];
         }
+        Impulses { normal: known, friction }.scaled(self.factor)
     }
-}
-
-/// Friction impulses along the tangents of another normal, with the same vector in the world.
-fn turned([along_first, along_second]: [f32; 2], old: [f32; 3], new: [f32; 3]) -> [f32; 2] {
-    let dot = |a: [f32; 3], b: [f32; 3]| (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-    let [first, second] = tangents(old);
-    let on_a = std::array::from_fn(|i| first[i] * along_first + second[i] * along_second);
-    let along = tangents(new).map(|tangent| dot(tangent, on_a));
-    // Where the normal has turned round, bodies A and B have changed places.
-    if dot(old, new) < 0.0 { along.map(|impulse| -impulse) } else { along }
 }
 
 fn used(collision: &Collision) -> &[Contact] {
@@ -311,16 +333,13 @@ mod tests {
     fn carried(old: [f32; 3], new: [f32; 3]) -> Impulses {
         let mut last = LastStep::default();
         last.commit(&[collision(old, &[])], &[IMPULSES]).expect("one collision");
-        let new = [collision(new, &[])];
-        last.placed(&new, &[Place::same(0)], 1.0).expect("its place").impulses(0)
+        let turned = [collision(new, &[])];
+        last.placed(&turned, &[Place::same(0)], 1.0).expect("its place").impulses(0, new, 0)
     }
 
     #[test]
     fn friction_turns_with_the_normal_and_with_the_order_of_the_bodies() {
-        let world = |normal: [f32; 3], [g0, g1]: [f32; 2]| {
-            let [t0, t1] = tangents(normal);
-            [0, 1, 2].map(|i| t0[i] * g0 + t1[i] * g1)
-        };
+        let world = |normal, friction: [f32; 2]| in_world(normal, friction.into());
         // The tangents of the tilted one are others, as its z is the largest.
         let (level, tilted) = ([0.0, 0.8, 0.6], [0.0, 0.6, 0.8]);
         assert_eq!(carried(level, level), IMPULSES, "the same bits");
@@ -354,7 +373,7 @@ mod tests {
         let new = [collision([0.0, 1.0, 0.0], &[])];
         let places = [Place::same(0)];
         let placed = last.placed(&new, &places, 1.0).expect("its place");
-        assert_eq!(placed.impulses(0), Impulses::ZERO);
+        assert_eq!(placed.impulses(0, new[0].normal, 0), Impulses::ZERO);
     }
 
     #[test]

@@ -210,7 +210,7 @@ fn too_long(input: &OrderInput<'_>, depth: u32, limit: usize, shapes: &[Shape]) 
     let (body, uses) = most.unwrap_or_default();
     let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     let excess = Excess::OrderTooLong { collisions, bodies, limit, depth, body, uses };
-    needs.refuse(excess, |variant| {
+    needs.refuse(excess, &|variant| {
         let Ok(window) = IssueWindow::of_variant(variant) else { return false };
         let apart = window.depth() as usize * window.per_issue() as usize;
         let of_body = uses.saturating_sub(1).saturating_mul(apart).saturating_add(1);

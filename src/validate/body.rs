@@ -5,18 +5,29 @@ use std::ops::RangeInclusive;
 use pgs_interface::number::StreamFormat;
 
 use super::range::Held;
-use super::{Excess, InputError, InputItem, OutOfRange, Scene, all_within, first};
+use super::{Excess, InputError, InputItem, OutOfRange, Scene, first};
 use crate::scene::{Body, Shape};
 
 const LINEAR: &str = "linear velocity";
 const ANGULAR: &str = "angular velocity";
 
 /// Checks one body.
-#[inline]
 pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result<(), InputError> {
     for (field, values, format) in fields(body, &scene.held) {
-        if !all_within(values, format.largest()) {
-            return Err(number_refused(index, body, (field, values, format), scene));
+        if let Some((component, found)) = first(values, |value| !value.is_finite()) {
+            return Err(InputError::BodyNotFinite { body: index, field, component, found });
+        }
+        let largest = format.largest();
+        let beyond = |value: f32, limit: f32| value.is_nan() || value.abs() > limit;
+        if let Some((component, found)) = first(values, |value| beyond(value, largest)) {
+            let (item, smallest) = (InputItem::Body(index), 0.0);
+            let number = OutOfRange { item, field, component, found, format, smallest, largest };
+            return Err(scene.needs.refuse(Excess::OutOfRange(number), &|variant| {
+                let mut fields = fields(body, &Held::by(&variant.numbers)).into_iter();
+                fields.all(|(_, values, format)| {
+                    first(values, |value| beyond(value, format.largest())).is_none()
+                })
+            }));
         }
     }
     let length = length(body.pose.orientation);
@@ -29,8 +40,7 @@ pub(crate) fn check_body(index: usize, body: &Body, scene: &Scene<'_>) -> Result
     };
     if shape.is_static() && !scene.kinematic {
         for (field, values) in [(LINEAR, body.velocity.linear), (ANGULAR, body.velocity.angular)] {
-            if values.iter().any(|value| *value != 0.0) {
-                let (component, found) = first(&values, |value| value != 0.0);
+            if let Some((component, found)) = first(&values, |value| value != 0.0) {
                 return Err(InputError::StaticBodyMoves { body: index, field, component, found });
             }
         }
@@ -71,28 +81,6 @@ fn fields<'a>(body: &'a Body, held: &Held) -> [Field<'a>; 4] {
         (LINEAR, &body.velocity.linear, held.velocities),
         (ANGULAR, &body.velocity.angular, held.velocities),
     ]
-}
-
-/// Names the number that puts a field out of range.
-#[cold]
-fn number_refused(
-    index: usize,
-    body: &Body,
-    (field, values, format): Field<'_>,
-    scene: &Scene<'_>,
-) -> InputError {
-    if !all_within(values, f32::MAX) {
-        let (component, found) = first(values, |value| !value.is_finite());
-        return InputError::BodyNotFinite { body: index, field, component, found };
-    }
-    let limit = format.largest();
-    let (component, found) = first(values, |value| value.abs() > limit);
-    let (item, smallest, largest) = (InputItem::Body(index), 0.0, limit);
-    let number = OutOfRange { item, field, component, found, format, smallest, largest };
-    scene.needs.refuse(Excess::OutOfRange(number), |variant| {
-        let fields = fields(body, &Held::by(&variant.numbers));
-        fields.iter().all(|(_, values, format)| all_within(values, format.largest()))
-    })
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ pub(crate) struct SceneNeeds {
 
 impl SceneNeeds {
     /// The profiles that have room for the scene and satisfy `can`.
-    pub(crate) fn capable(&self, can: impl Fn(&Variant) -> bool) -> CapableProfiles {
+    pub(crate) fn capable(&self, can: &dyn Fn(&Variant) -> bool) -> CapableProfiles {
         let mut profiles = 0;
         for (at, profile) in PROFILES.iter().enumerate() {
             let variant = Variant { inertia: self.inertia, ..profile.default_variant() };
@@ -90,22 +90,22 @@ mod tests {
     use super::super::tests::NEEDS as SMALL;
     use super::*;
 
-    fn names(needs: SceneNeeds, can: impl Fn(&Variant) -> bool) -> Vec<&'static str> {
+    fn names(needs: SceneNeeds, can: &dyn Fn(&Variant) -> bool) -> Vec<&'static str> {
         needs.capable(can).profiles().map(|profile| profile.name).collect()
     }
 
     #[test]
     fn profiles_are_named_in_the_order_of_the_table() {
         let all = ["naive", "float", "half"];
-        assert_eq!(names(SMALL, |_| true), all);
-        let text = SMALL.capable(|variant| variant.profile.name != "half").to_string();
+        assert_eq!(names(SMALL, &|_| true), all);
+        let text = SMALL.capable(&|variant| variant.profile.name != "half").to_string();
         assert_eq!(text, "profiles that could: naive, float");
-        assert_eq!(SMALL.capable(|_| false).to_string(), "no profile could");
+        assert_eq!(SMALL.capable(&|_| false).to_string(), "no profile could");
         let world = SceneNeeds { inertia: Inertia::World, ..SMALL };
-        let text = world.capable(|variant| variant.profile.id == 1).to_string();
+        let text = world.capable(&|variant| variant.profile.id == 1).to_string();
         assert_eq!(text, "profiles that could, built with world inertia: float");
         assert_eq!(
-            world.capable(|_| false).to_string(),
+            world.capable(&|_| false).to_string(),
             "no profile could, built with world inertia"
         );
     }
@@ -114,15 +114,15 @@ mod tests {
     fn a_profile_without_room_for_the_scene_is_left_out() {
         // 16-bit indices end at 65,535.
         let bodies = |bodies| SceneNeeds { bodies, ..SMALL };
-        assert_eq!(names(bodies(65_536), |_| true).len(), 3);
-        assert_eq!(names(bodies(65_537), |_| true), ["naive", "float"]);
-        assert_eq!(names(bodies(131_073), |_| true), [""; 0]);
+        assert_eq!(names(bodies(65_536), &|_| true).len(), 3);
+        assert_eq!(names(bodies(65_537), &|_| true), ["naive", "float"]);
+        assert_eq!(names(bodies(131_073), &|_| true), [""; 0]);
         // 4 MiB: 16 bytes a collision in f32, 8 in half.
         let collisions = |collisions| SceneNeeds { collisions, ..SMALL };
-        assert_eq!(names(collisions(300_000), |_| true), ["half"]);
+        assert_eq!(names(collisions(300_000), &|_| true), ["half"]);
         // 48 bytes a body with world inertia, which half and naive are not built with.
         let world = |bodies| SceneNeeds { bodies, collisions: 100_000, inertia: Inertia::World };
-        assert_eq!(names(world(50_000), |_| true), ["float"]);
-        assert_eq!(names(world(60_000), |_| true), [""; 0]);
+        assert_eq!(names(world(50_000), &|_| true), ["float"]);
+        assert_eq!(names(world(60_000), &|_| true), [""; 0]);
     }
 }

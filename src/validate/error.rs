@@ -433,7 +433,7 @@ impl SceneNeeds {
     /// The error of a scene that exceeds a bitstream; `can` tells whether another would take the
     /// excess.
     #[cold]
-    pub(crate) fn refuse(&self, excess: Excess, can: impl Fn(&Variant) -> bool) -> InputError {
+    pub(crate) fn refuse(&self, excess: Excess, can: &dyn Fn(&Variant) -> bool) -> InputError {
         InputError::BeyondBitstream { excess, capable: self.capable(can) }
     }
 }

@@ -25,7 +25,7 @@ use self::body::check_body;
 use self::collision::check_collision;
 use self::parameters::check_parameters;
 use self::range::{Held, check_impulses, check_range};
-use self::rows::Rows;
+use self::rows::{Rows, ShapeBounds};
 use self::shape::check_shapes;
 use crate::control_block::Capabilities;
 use crate::record::body_table::Ends;
@@ -99,6 +99,7 @@ impl Limits {
 ///
 /// `shapes` is a table that [`validate_shapes`] has accepted; a shape of inverse mass 0 is static.
 /// Among several mistakes of one kind, the mistake with the lowest index is reported.
+#[inline]
 pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -107,26 +108,12 @@ pub(crate) fn validate<B: Bodies + ?Sized, C: Collisions + ?Sized>(
     limits: &Limits,
 ) -> Result<(), InputError> {
     let scene = preflight(bodies, collisions, shapes, parameters, limits)?;
-    for index in 0..scene.needs.bodies {
-        check_body(index, &bodies.body(index), &scene)?;
-    }
-    // A body without a shape was refused above.
-    let end = |index: usize| {
-        let body = bodies.body(index);
-        (body.pose.position, scene.shape_of(&body).unwrap_or(&Shape::STATIC))
-    };
-    for index in 0..scene.needs.collisions {
-        let collision = collisions.collision(index);
-        check_whole(index, &collision, end, &scene)?;
-        if parameters.warm_start {
-            check_impulses(index, &collisions.impulses(index).used(collision.count), &scene)?;
-        }
-    }
-    Ok(())
+    scene.check(&|index| bodies.body(index), &collisions, parameters.warm_start)
 }
 
 /// The first part of [`validate`]: checks parameters, counts and shapes, before any body or
 /// collision. Returns the context of the checks that follow.
+#[inline]
 pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     bodies: &B,
     collisions: &C,
@@ -134,15 +121,22 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
     parameters: &StepParameters,
     limits: &'a Limits,
 ) -> Result<Scene<'a>, InputError> {
-    for (what, agree) in
-        [("bodies", bodies.lengths_agree()), ("collisions", collisions.lengths_agree())]
-    {
-        if !agree {
-            return Err(InputError::UnequalLengths { what });
-        }
-    }
-    let needs =
-        SceneNeeds { bodies: bodies.len(), collisions: collisions.len(), inertia: needed(shapes) };
+    let bodies = bodies.lengths_agree().then(|| bodies.len());
+    let collisions = collisions.lengths_agree().then(|| collisions.len());
+    check_counts([bodies, collisions], shapes, parameters, limits)
+}
+
+/// [`preflight`] by the numbers of bodies and collisions; `None` where separate arrays have unequal
+/// lengths.
+fn check_counts<'a>(
+    [bodies, collisions]: [Option<usize>; 2],
+    shapes: &'a [Shape],
+    parameters: &StepParameters,
+    limits: &'a Limits,
+) -> Result<Scene<'a>, InputError> {
+    let bodies = bodies.ok_or(InputError::UnequalLengths { what: "bodies" })?;
+    let collisions = collisions.ok_or(InputError::UnequalLengths { what: "collisions" })?;
+    let needs = SceneNeeds { bodies, collisions, inertia: needed(shapes) };
     check_parameters(parameters, &needs, limits)?;
     if needs.bodies > 0 {
         check_room(&needs, limits)?;
@@ -152,11 +146,10 @@ pub(crate) fn preflight<'a, B: Bodies + ?Sized, C: Collisions + ?Sized>(
 }
 
 /// Checks one collision; `end` returns the position and the shape of a body.
-#[inline]
 fn check_whole<'a>(
     index: usize,
     collision: &Collision,
-    end: impl Fn(usize) -> ([f32; 3], &'a Shape),
+    end: &dyn Fn(usize) -> ([f32; 3], &'a Shape),
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
     if collision.is_empty() {
@@ -176,10 +169,7 @@ fn check_whole<'a>(
         return Ok(());
     }
     check_range(index, collision, positions, scene)?;
-    if scene.computes_short_rows() {
-        Rows { index, collision, positions, shapes }.check(scene)?;
-    }
-    Ok(())
+    Rows { index, collision, positions, shapes }.check(scene)
 }
 
 /// The context in which bodies and collisions are checked.
@@ -193,6 +183,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) kinematic: bool,
     /// The bits of a collision's count that are its number of [points](Self::points).
     points: u32,
+    /// Where constraint rows are computed in sixteen bits.
+    pub(crate) short_rows: Option<ShapeBounds>,
 }
 
 impl<'a> Scene<'a> {
@@ -206,7 +198,9 @@ impl<'a> Scene<'a> {
         let StepParameters { kinematic, pair_friction, .. } = *parameters;
         let held = Held::by(&variant.numbers);
         let points = if pair_friction { !layout::FRICTION_BITS } else { u32::MAX };
-        Self { shapes, needs, variant, held, kinematic, points }
+        let is_short = variant.numbers.rows == Precision::Binary16;
+        let short_rows = is_short.then(|| ShapeBounds::of(shapes));
+        Self { shapes, needs, variant, held, kinematic, points, short_rows }
     }
 
     /// The shape of a body, if it has one.
@@ -215,9 +209,31 @@ impl<'a> Scene<'a> {
         usize::try_from(body.shape).ok().and_then(|shape| self.shapes.get(shape))
     }
 
-    /// Whether constraint rows are computed in sixteen bits.
-    pub(crate) fn computes_short_rows(&self) -> bool {
-        self.variant.numbers.rows == Precision::Binary16
+    /// Checks each body and each collision, in a `warm` step with its impulses.
+    fn check(
+        &self,
+        body: &dyn Fn(usize) -> Body,
+        collisions: &dyn Collisions,
+        warm: bool,
+    ) -> Result<(), InputError> {
+        for index in 0..self.needs.bodies {
+            check_body(index, &body(index), self)?;
+        }
+        // A body without a shape was refused above.
+        let end = |index: usize| {
+            let body = body(index);
+            (body.pose.position, self.shape_of(&body).unwrap_or(&Shape::STATIC))
+        };
+        for index in 0..self.needs.collisions {
+            let collision = collisions.collision(index);
+            check_whole(index, &collision, &end, self)?;
+            if warm {
+                let (normal, points) = (collision.normal, collision.points());
+                let impulses = collisions.impulses(index, normal, points).used(collision.count);
+                check_impulses(index, &impulses, self)?;
+            }
+        }
+        Ok(())
     }
 
     /// Checks collisions from index `first` on as [`validate`] does.
@@ -236,13 +252,13 @@ impl<'a> Scene<'a> {
             (end.position, end.shape(self.shapes))
         };
         let mut collisions = (first..).zip(collisions);
-        collisions.try_for_each(|(index, collision)| check_whole(index, collision, end, self))
+        collisions.try_for_each(|(index, collision)| check_whole(index, collision, &end, self))
     }
 }
 
 fn check_room(needs: &SceneNeeds, limits: &Limits) -> Result<(), InputError> {
     let SceneNeeds { bodies, collisions, .. } = *needs;
-    let refuse = |excess| Err(needs.refuse(excess, |_| true));
+    let refuse = |excess| Err(needs.refuse(excess, &|_| true));
     let limit = limits.body_capacity;
     if exceeds(bodies, limit) {
         return refuse(Excess::TooManyBodies { found: bodies, limit });
@@ -265,18 +281,9 @@ fn exceeds(found: usize, limit: u32) -> bool {
     !u32::try_from(found).is_ok_and(|found| found <= limit)
 }
 
-/// Whether every value is a number of at most this magnitude. No branch per value: these loops read
-/// every number of a step.
-fn all_within(values: &[f32], limit: f32) -> bool {
-    values.iter().fold(true, |within, value| within & (value.abs() <= limit))
-}
-
-/// The index of the first wrong value, and the value. The caller knows that one exists; if none is
-/// found, the refusal stands with index 0 and NaN.
-#[cold]
-fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> (usize, f32) {
-    let mut values = values.iter().copied().enumerate();
-    values.find(|(_, value)| wrong(*value)).unwrap_or((0, f32::NAN))
+/// The index of the first wrong value, and the value.
+fn first(values: &[f32], wrong: impl Fn(f32) -> bool) -> Option<(usize, f32)> {
+    values.iter().copied().enumerate().find(|(_, value)| wrong(*value))
 }
 
 #[cfg(test)]

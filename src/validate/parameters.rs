@@ -51,7 +51,7 @@ pub(crate) fn check_parameters(
     }
     if parameters.pair_friction && !limits.variant.has_pair_friction() {
         let excess = Excess::NotInRecords { asked: "a friction for each collision" };
-        return Err(needs.refuse(excess, Variant::has_pair_friction));
+        return Err(needs.refuse(excess, &Variant::has_pair_friction));
     }
     if computes_short(&limits.variant.numbers) {
         let (format, component) = (StreamFormat::Binary16, 0);
@@ -68,7 +68,7 @@ pub(crate) fn check_parameters(
                 let number =
                     OutOfRange { item, field, component, found, format, smallest, largest };
                 let holds = |variant: &Variant| !computes_short(&variant.numbers);
-                return Err(needs.refuse(Excess::OutOfRange(number), holds));
+                return Err(needs.refuse(Excess::OutOfRange(number), &holds));
             }
         }
     }

@@ -3,6 +3,7 @@
 use pgs_interface::number::{Numbers, Precision, StreamFormat};
 use pgs_interface::profile::Variant;
 
+use super::collision::numbers_of;
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
 use crate::scene::{CONTACT_POINTS, Collision, Contact, Impulses};
 
@@ -66,7 +67,7 @@ pub(crate) fn check_impulses(
     let (field, (component, found)) = beyond.unwrap_or(("normal impulse", (0, f32::NAN)));
     let item = InputItem::Collision(index, None);
     let number = OutOfRange { item, field, component, found, format, smallest: 0.0, largest };
-    Err(scene.needs.refuse(Excess::OutOfRange(number), |variant| {
+    Err(scene.needs.refuse(Excess::OutOfRange(number), &|variant| {
         impulses.are_within(largest_impulse(&variant.numbers))
     }))
 }
@@ -79,80 +80,57 @@ pub(crate) const fn computes_short(numbers: &Numbers) -> bool {
 /// The smallest magnitude that binary16 does not round to 0, the subnormal 2^-24.
 pub(crate) const SMALLEST_SHORT: f32 = 1.0 / 16_777_216.0;
 
-/// The number of vectors that [`vectors`] lists.
-const VECTORS: usize = 3;
-
 /// Checks every number of a collision as it is streamed. [`check_collision`] has accepted it.
 ///
 /// `positions` belong to bodies A and B.
 ///
 /// [`check_collision`]: super::collision::check_collision
-// Not inlined: collisions in f32 never reach it.
-#[inline(never)]
 pub(crate) fn check_range(
     index: usize,
     collision: &Collision,
     positions: [[f32; 3]; 2],
     scene: &Scene<'_>,
 ) -> Result<(), InputError> {
-    if fits(scene.variant, collision, positions) {
+    let format = scene.held.collisions;
+    let Some((contact, field, component, found)) = beyond(format, collision, positions) else {
         return Ok(());
-    }
-    Err(refused(index, collision, positions, scene))
+    };
+    let item = InputItem::Collision(index, contact);
+    let (smallest, largest) = (0.0, format.largest());
+    let number = OutOfRange { item, field, component, found, format, smallest, largest };
+    Err(scene
+        .needs
+        .refuse(Excess::OutOfRange(number), &|variant| fits(variant, collision, positions)))
 }
 
 /// Whether every number of a collision is in a bitstream's range.
 pub(crate) fn fits(variant: &Variant, collision: &Collision, positions: [[f32; 3]; 2]) -> bool {
-    let limit = Held::by(&variant.numbers).collisions.largest();
-    let within = |vector: [f32; 3]| {
-        (vector[0].abs() <= limit) & (vector[1].abs() <= limit) & (vector[2].abs() <= limit)
-    };
-    let vectors = vectors(collision, positions);
-    let mut fit = vectors.iter().fold(true, |fit, (_, vector)| fit & within(*vector));
-    for (ordinal, contact) in (0..).zip(&collision.contacts) {
-        let used = within(contact.point) & (contact.distance.abs() <= limit);
-        fit &= used | (ordinal >= collision.count);
-    }
-    fit
+    beyond(Held::by(&variant.numbers).collisions, collision, positions).is_none()
 }
 
-/// The streamed vectors of a collision, contact points excluded: name and value.
-fn vectors(collision: &Collision, [a, b]: [[f32; 3]; 2]) -> [(&'static str, [f32; 3]); VECTORS] {
-    [("normal", collision.normal), ("position of body A", a), ("position of body B", b)]
+/// The first number of a collision that a format does not hold: contact point, name, component,
+/// value.
+fn beyond(
+    format: StreamFormat,
+    collision: &Collision,
+    [a, b]: [[f32; 3]; 2],
+) -> Option<(Option<usize>, &'static str, usize, f32)> {
+    let limit = format.largest();
+    let vectors =
+        [("normal", collision.normal), ("position of body A", a), ("position of body B", b)];
+    let vectors = vectors.into_iter().flat_map(|(field, [x, y, z])| {
+        [(0, x), (1, y), (2, z)].map(|(component, found)| (None, field, component, found))
+    });
+    let contacts = used(collision).iter().enumerate().flat_map(numbers_of);
+    let contacts =
+        contacts.map(|(at, field, component, found)| (Some(at), field, component, found));
+    vectors.chain(contacts).find(|(.., found)| found.is_nan() || found.abs() > limit)
 }
 
 /// The used contact points.
 pub(crate) fn used(collision: &Collision) -> &[Contact] {
     let used = usize::try_from(collision.count).unwrap_or(CONTACT_POINTS).min(CONTACT_POINTS);
     &collision.contacts[..used]
-}
-
-/// Names the number that is out of range.
-#[cold]
-fn refused(
-    index: usize,
-    collision: &Collision,
-    positions: [[f32; 3]; 2],
-    scene: &Scene<'_>,
-) -> InputError {
-    let format = scene.held.collisions;
-    let limit = format.largest();
-    let of_contacts = used(collision).iter().enumerate().flat_map(|(at, contact)| {
-        let [x, y, z] = contact.point;
-        [("point", 0, x), ("point", 1, y), ("point", 2, z), ("distance", 0, contact.distance)]
-            .map(|(field, component, found)| (Some(at), field, component, found))
-    });
-    let (contact, field, component, found) = vectors(collision, positions)
-        .into_iter()
-        .flat_map(|(field, [x, y, z])| {
-            [(0, x), (1, y), (2, z)].map(|(component, found)| (None, field, component, found))
-        })
-        .chain(of_contacts)
-        .find(|(.., found)| found.is_nan() || found.abs() > limit)
-        .unwrap_or((None, "normal", 0, collision.normal[0]));
-    let (item, smallest, largest) = (InputItem::Collision(index, contact), 0.0, limit);
-    let number = OutOfRange { item, field, component, found, format, smallest, largest };
-    scene.needs.refuse(Excess::OutOfRange(number), |variant| fits(variant, collision, positions))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use pgs_interface::profile::Variant;
 
 use super::range::{fits, used};
 use super::{Excess, InputError, InputItem, OutOfRange, Scene};
+use crate::record::Magnitudes;
 use crate::record::body_table::Ends;
 use crate::scene::{Collision, Shape};
 
@@ -41,18 +42,68 @@ impl Scene<'_> {
     }
 }
 
+/// Bounds of a table's shapes.
+#[derive(Debug)]
+pub(crate) struct ShapeBounds {
+    /// The inverse mass of the heaviest shape that is not static.
+    heaviest: f32,
+    /// The largest inverse mass.
+    lightest: f32,
+    /// The largest inverse inertia about any axis.
+    inertia: f32,
+}
+
+impl ShapeBounds {
+    pub(super) fn of(shapes: &[Shape]) -> Self {
+        let none = Self { heaviest: f32::INFINITY, lightest: 0.0, inertia: 0.0 };
+        shapes.iter().filter(|shape| !shape.is_static()).fold(none, |bounds, shape| {
+            let [x, y, z] = shape.inverse_inertia;
+            Self {
+                heaviest: bounds.heaviest.min(shape.inverse_mass),
+                lightest: bounds.lightest.max(shape.inverse_mass),
+                inertia: bounds.inertia.max(x).max(y).max(z),
+            }
+        })
+    }
+
+    /// Whether the rows of all collisions with these largest contact points and positions fit: each
+    /// sum is that of [`Rows::fit`], of larger terms. If it does not hold, the rows of each may fit
+    /// or not. The collisions are right otherwise; one without contact points has no rows.
+    pub(crate) fn all_fit(&self, points: Magnitudes, positions: Magnitudes) -> bool {
+        let points = points.vec3();
+        let arm = arm(points, positions.vec3().map(|position| -position));
+        let [x, y, z] = arm;
+        let turning = self.inertia * (x * x + y * y + z * z);
+        (self.heaviest >= 1.0 / LARGEST)
+            & arm.iter().all(|arm| *arm <= LONGEST_ARM)
+            & (self.lightest + self.lightest + turning + turning <= LARGEST)
+            & points.iter().all(|x| x + x + x + x <= LARGEST)
+    }
+}
+
 /// A number on the way to the rows: contact point, name, component, value, smallest, largest.
 type Found = (Option<usize>, &'static str, usize, f32, f32, f32);
 
 impl Rows<'_> {
-    /// Refuses a collision with a number out of range.
-    // Not inlined: collisions whose rows are computed in f32 never reach it.
-    #[inline(never)]
+    /// Refuses a collision with a number out of range, on a bitstream that computes rows in sixteen
+    /// bits.
     pub(crate) fn check(&self, scene: &Scene<'_>) -> Result<(), InputError> {
-        if self.fit(scene.variant) {
+        if scene.short_rows.is_none() {
             return Ok(());
         }
-        Err(self.refused(scene))
+        let mut numbers = self.numbers().into_iter();
+        let wrong =
+            numbers.find(|(.., found, smallest, largest)| !(*smallest..=*largest).contains(found));
+        let Some((contact, field, component, found, smallest, largest)) = wrong else {
+            return Ok(());
+        };
+        // The sum of the masses has no upper limit of its own: the effective mass includes it.
+        let format = StreamFormat::Binary16;
+        let (item, largest) = (InputItem::Rows(self.index, contact), largest.min(format.largest()));
+        let number = OutOfRange { item, field, component, found, format, smallest, largest };
+        Err(scene.needs.refuse(Excess::OutOfRange(number), &|variant| {
+            fits(variant, self.collision, self.positions) && self.fit(variant)
+        }))
     }
 
     /// Whether every row stays in the range of a bitstream's arithmetic.
@@ -110,31 +161,6 @@ impl Rows<'_> {
         }
         numbers
     }
-
-    /// Names the number that is out of range.
-    #[cold]
-    fn refused(&self, scene: &Scene<'_>) -> InputError {
-        let (smallest, largest) = (1.0 / LARGEST, f32::INFINITY);
-        let (contact, field, component, found, smallest, largest) = self
-            .numbers()
-            .into_iter()
-            .find(|(.., found, smallest, largest)| !(smallest..=largest).contains(&found))
-            .unwrap_or((
-                None,
-                "sum of the inverse masses",
-                0,
-                self.inverse_mass(),
-                smallest,
-                largest,
-            ));
-        // The sum of the masses has no upper limit of its own: the effective mass includes it.
-        let format = StreamFormat::Binary16;
-        let (item, largest) = (InputItem::Rows(self.index, contact), largest.min(format.largest()));
-        let number = OutOfRange { item, field, component, found, format, smallest, largest };
-        scene.needs.refuse(Excess::OutOfRange(number), |variant| {
-            fits(variant, self.collision, self.positions) && self.fit(variant)
-        })
-    }
 }
 
 /// The largest magnitude of each component of a lever arm, over all roundings of its two ends.
@@ -156,6 +182,8 @@ mod tests {
     use super::*;
     use crate::scene::Contact;
     use pgs_interface::profile::{FLOAT, HALF};
+    use pgs_interface::record::Beat;
+    use proptest::prelude::*;
 
     const CUBE: Shape = Shape::isotropic(1.0, 1.5);
     const GROUND: Shape = Shape::STATIC;
@@ -258,5 +286,55 @@ mod tests {
         assert_eq!(check(16_000.0), Ok(()));
         let text = check(-16_100.0).expect_err("64,400");
         assert!(text.contains("sum of the contact points[0] is 64400"), "{text}");
+    }
+
+    /// The bounds of a table, and whether they hold for collisions of these positions and points.
+    fn bound(shapes: &[Shape], collisions: &[(Collision, [[f32; 3]; 2])]) -> bool {
+        let [mut points, mut places] = [Magnitudes::default(); 2];
+        let row = |[x, y, z]: [f32; 3]| Beat([x, y, z, 0.0].map(f32::to_bits));
+        for (collision, positions) in collisions {
+            used(collision).iter().for_each(|contact| points.see(row(contact.point)));
+            positions.iter().for_each(|position| places.see(row(*position)));
+        }
+        ShapeBounds::of(shapes).all_fit(points, places)
+    }
+
+    #[test]
+    fn the_bound_holds_for_a_scene_of_usual_size_and_not_beyond_the_limits() {
+        let of = |point: [f32; 3], inverse_mass, inertia| {
+            let shapes = [Shape::STATIC, Shape::isotropic(inverse_mass, inertia)];
+            bound(&shapes, &[(collision(point), [point, [0.0; 3]])])
+        };
+        assert!(of([40.0, 30.0, 40.0], 1.0, 1.5));
+        assert!(!of([40.0, 30.0, 40.0], 1.0, 150.0), "effective mass");
+        assert!(!of([1.0, 0.0, 0.0], 1.5e-5, 0.0), "66 t");
+        assert!(!of([0.0, 43_000.0, 0.0], 1.0, 0.0), "lever arm");
+        assert!(!of([0.0, 16_100.0, 0.0], 1.0, 0.0), "sum of the points");
+    }
+
+    proptest! {
+        #[test]
+        fn the_bound_of_a_block_holds_for_each_of_its_collisions(
+            digits in 0.0_f32..5.0,
+            inertia in 0.0_f32..3.0,
+            block in prop::collection::vec((prop::array::uniform18(-1.0_f32..1.0), 1_u32..5), 1..4),
+        ) {
+            let shape = Shape::isotropic(1.0, inertia);
+            let size = 10.0_f32.powf(digits);
+            let block: Vec<_> = block
+                .into_iter()
+                .map(|(numbers, count)| {
+                    let place = |at: usize| std::array::from_fn(|k| size * numbers[3 * at + k]);
+                    let contacts = [0, 1, 2, 3].map(|at| Contact { point: place(at), distance: 0.0 });
+                    let collision = Collision { count, contacts, ..collision([0.0; 3]) };
+                    (collision, [place(4), place(5)])
+                })
+                .collect();
+            let shapes = [&shape; 2];
+            let fit = block.iter().all(|(collision, positions)| {
+                Rows { index: 0, collision, positions: *positions, shapes }.fit(&HALF_BUILT)
+            });
+            prop_assert!(fit || !bound(&[Shape::STATIC, shape], &block));
+        }
     }
 }

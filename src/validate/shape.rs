@@ -51,7 +51,7 @@ pub(crate) fn check_shapes(
         }
         if limits.variant.inertia == Inertia::Isotropic && !shape.is_isotropic() {
             let excess = Excess::Anisotropic { shape: index, found: shape.inverse_inertia };
-            return Err(needs.refuse(excess, |_| true));
+            return Err(needs.refuse(excess, &|_| true));
         }
         let smallest = SMALLEST_SHORT;
         let beyond = |field: &'static str, found: f32, variant: &Variant| {
@@ -68,7 +68,7 @@ pub(crate) fn check_shapes(
                 let number =
                     OutOfRange { item, field, component, found, format, smallest, largest };
                 let holds = |variant: &Variant| beyond(field, found, variant).is_none();
-                return Err(needs.refuse(Excess::OutOfRange(number), holds));
+                return Err(needs.refuse(Excess::OutOfRange(number), &holds));
             }
         }
     }

@@ -46,7 +46,11 @@ fn last(collisions: &[Collision]) -> LastStep {
 
 fn found(last: &LastStep, collisions: &[Collision], places: &[Place]) -> Vec<Impulses> {
     let placed = last.placed(collisions, places, 0.5).expect("places of the last step");
-    (0..collisions.len()).map(|index| placed.impulses(index)).collect()
+    collisions
+        .iter()
+        .enumerate()
+        .map(|(at, of)| placed.impulses(at, of.normal, of.points()))
+        .collect()
 }
 
 #[test]

@@ -41,7 +41,8 @@ pack=$(built pack)
 speed=$(built speed)
 
 # All of packing is in the first of these functions, all that the board does in the last.
-packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::bodies::BodyPacker::write')
+packers=('zynq_pgs::beat::collisions::CollisionPacker::write*' 'zynq_pgs::beat::impulses::WarmDealer::write'
+	'zynq_pgs::beat::bodies::BodyPacker::write')
 board='bitstream_model::board::Board::advance'
 log=$(mktemp)
 litter+=("$log")
@@ -109,9 +110,9 @@ done <<'LIMITS'
 float as-given 275
 float in-order 268
 float warm 340
-half as-given 720
-half in-order 680
-half warm 760
+half as-given 376
+half in-order 394
+half warm 473
 LIMITS
 
 # A step on the emulated board, on one thread; the vectors are those that valgrind knows, AVX2.

@@ -1,23 +1,22 @@
 // The issue queue of a pass (specification, section 8): the oldest collision that is free of hazards
 // goes. It decides in slots of two cycles, so that nothing depends on the time at which a beat comes.
 //
-//   taken by the finder -> a slot -> last uses, pairs, timer -> enters -> free -> issues
+// Collisions stand in places, the oldest in the lowest: the queue, and behind it a few places for the ones
+// that have left the finder and not entered. As one enters, all behind the one that issued move on by a place.
+// So the order of the places is the order of the stream, and a place holds no more than who uses which
+// bodies, from which slot on it is free, and where its record lies: records do not move.
 //
-// A record keeps its slot from the finder to its issue. There are a few more slots than the depth, for
-// records that have not entered yet. A record may issue once it has entered. Two matrices have a bit for each pair of slots: which one is older, and whether they
-// have a moving body in common. With them no number of a body lies on the way from one decision to the
-// next one:
+//   phase 1    the first of the free places; who has a body in common with the oldest of all
+//   phase 0    it issues; who has a body in common with it is held for the window; one enters; the free places
 //
-//   phase 1    the oldest of the free ones, by the order; the ones in conflict with the oldest of all
-//   phase 0    it issues; timers of the ones in conflict with it; the free ones; the oldest of all
-//
-// A timer counts the slots until a collision is free. While nothing is under way, all are 0.
+// Both cycles of a slot have the same comparators: the bodies of the one that issues, or of the oldest one, with
+// those of all places.
 `default_nettype none
 
 module queue #(
   parameter DEPTH     = 64,
-  parameter SLOTS     = 68,
-  parameter SLOT      = 7,                     // bits of a slot's number
+  parameter SLOTS     = 68,                    // places and records: COMING more than the depth
+  parameter SLOT      = 7,                     // bits of a record's number
   parameter BODY      = 16,
   parameter COLLISION = 17,
   parameter WINDOW    = 162,                   // slots; at most 255
@@ -25,12 +24,12 @@ module queue #(
 ) (
   input  wire                 clk,
   input  wire                 clear,           // a step begins
-  input  wire                 phase,           // 0 in the cycles in which a collision can be issued; alternates in a pass
+  input  wire                 phase,           // 0 in the cycles in which a collision can be issued; alternates
   input  wire                 passing,         // a pass has collisions left
   input  wire                 parity,          // of the pass
   input  wire [19:0]          collisions,
 
-  // From the finder: a collision is taken, and 1, 2 and 3 cycles later.
+  // From the finder: a collision is taken in phase 1, and 1, 2 and 3 cycles later.
   output wire                 has_slot,
   input  wire                 take,
   input  wire                 comes_s1,
@@ -55,7 +54,7 @@ module queue #(
   output wire [31:0]          hazards,         // collisions that met a hazard; saturates; counted a cycle later
   output wire [511:0]         first,           // rows 0 to 3 in the cycle of an issue
   output wire [511:0]         rest,            // rows 4 to 7 in the next one
-  output wire [FACTS-1:0]     facts,
+  output wire [FACTS-1:0]     facts,           // in the cycle of an issue
 
   // Issues in the two slots before.
   input  wire [BODY-1:0]      early_a,
@@ -70,60 +69,60 @@ module queue #(
 );
 `include "pgs_interface.vh"
 
-  localparam [7:0]  HELD     = WINDOW - 1;     // timer of a collision after an issue in conflict
   localparam [10:0] PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW;
+  localparam        COMING   = SLOTS - DEPTH;
 
-  // ---- Slots and records
+  // ---- Collisions that come, and records
 
   wire [SLOT-1:0] next_slot;
-  reg  [SLOT-1:0] pick_slot;
+  reg  [SLOT-1:0] asked_slot;        // record of the one that issues, in phase 0; of the oldest one, in phase 1
+  reg  [BODY-1:0] asked_a, asked_b;  // its bodies
+  reg             asked_moves_a, asked_moves_b;
   wire            beats_some, enters;
-  reg             comes_s2, comes_s3, comes_s4, comes_s5;
-  reg  [SLOT-1:0] slot_s1, slot_s2, slot_s3, slot_s4, slot_s5;
+  reg             comes_s2, comes_s3;
+  reg  [SLOT-1:0] slot_s1, slot_s2, slot_s3;
   queue_records #(.SLOTS(SLOTS), .SLOT(SLOT), .FACTS(FACTS)) records (
     .clk(clk), .clear(clear), .phase(phase),
-    .free(has_slot), .next(next_slot), .take(take), .release_slot(issues), .released(pick_slot),
+    .next(next_slot), .take(take), .release_slot(issues), .released(asked_slot),
     .beats_there(beats_there), .beats(beats), .loads(loads), .loads_rest(loads_rest),
     .facts_come(comes_s3), .facts_slot(slot_s3), .facts_in(facts_s3), .some(beats_some), .enters(enters),
-    .slot(pick_slot), .first(first), .rest(rest), .facts(facts)
+    .slot(asked_slot), .first(first), .rest(rest), .facts(facts)
   );
 
-  reg [BODY-1:0]  a_s2, b_s2;
+  // Taken and not entered: there is a place for each.
+  localparam [SLOT-1:0] ALL_COME = COMING;
+  reg  [SLOT-1:0] come;
+  assign has_slot = come != ALL_COME;
+  reg  [BODY-1:0] a_s2, b_s2, a_s3, b_s3;
   always @(posedge clk) begin
-    {comes_s2, comes_s3, comes_s4, comes_s5} <= {comes_s1, comes_s2, comes_s3, comes_s4} & {4{~clear}};
-    slot_s1 <= next_slot;
-    {slot_s2, slot_s3, slot_s4, slot_s5} <= {slot_s1, slot_s2, slot_s3, slot_s4};
-    {a_s2, b_s2} <= {a_s1, b_s1};
+    come <= clear ? {SLOT{1'b0}} : come + {{(SLOT-1){1'b0}}, take} - {{(SLOT-1){1'b0}}, enters};
+    {comes_s2, comes_s3}           <= {comes_s1, comes_s2} & {2{~clear}};
+    {slot_s1, slot_s2, slot_s3}    <= {next_slot, slot_s1, slot_s2};
+    {a_s2, b_s2, a_s3, b_s3}       <= {a_s1, b_s1, a_s2, b_s2};
   end
-  wire passes_slot;
-  wire [7:0] slots_s5;
+
+  wire       passes_slot, held_s5;
+  wire [7:0] free_at_s5, slot_after, issue_free_at;
   queue_hazard #(.BODY(BODY), .COLLISION(COLLISION), .WINDOW(WINDOW)) first_hazard (
     .clk(clk), .idle(~passing), .parity(parity), .passes_slot(passes_slot), .issues(issues),
     .a_s2(a_s2), .b_s2(b_s2), .use_a_s2(use_a_s2), .use_b_s2(use_b_s2),
-    .moves_a_s3(moves_a_s3), .moves_b_s3(moves_b_s3), .slots_s5(slots_s5),
+    .moves_a_s3(moves_a_s3), .moves_b_s3(moves_b_s3), .held_s5(held_s5), .free_at_s5(free_at_s5),
+    .slot_after(slot_after), .issue_free_at(issue_free_at),
     .early_a(early_a), .early_b(early_b), .early_moves_a(early_moves_a), .early_moves_b(early_moves_b),
     .body_a(body_a), .body_b(body_b), .body_moves_a(body_moves_a), .body_moves_b(body_moves_b),
     .use_of_body(use_of_body)
   );
 
-  // The next one to enter.
-  wire [SLOT-1:0] entry;
-  wire [SLOT:0]   come_left;
-  wire            come_some, come_below;
-  wire            unused = &{1'b0, come_left, come_below};
-  fifo #(.WIDTH(SLOT), .ADDRESS(SLOT)) come (
-    .clk(clk), .clear(clear), .push(comes_s4), .in(slot_s4), .pop(enters), .head(entry),
-    .count(come_left), .some(come_some), .below(come_below)
-  );
-
   // ---- Slots of the pass
 
   localparam [19:0] FULL = DEPTH;
+  reg  [SLOTS-1:0] occupied;         // places
   reg  [19:0] to_enter, to_fill, filled_first;
   reg         more, filling, owed;   // some have not entered; the queue is not full at first, or after an issue
   reg         decides, some_free;
-  wire        begins = ~phase & passing;
-  wire        there  = come_some & beats_some;
+  wire        begins      = ~phase & passing;
+  wire        there       = occupied[DEPTH] & beats_some;
+  wire        will_decide = phase & passing & ~filling & ~owed & has_room;
   assign issues      = decides & some_free;
   assign stalls      = decides & ~some_free;
   assign enters      = begins & there & (filling | owed | (issues & more));
@@ -131,7 +130,7 @@ module queue #(
   assign passes_slot = decides | (begins & filling & there);
   always @(posedge clk) begin
     filled_first <= (collisions < FULL) ? collisions : FULL;
-    decides      <= phase & passing & ~filling & ~owed & has_room;
+    decides      <= will_decide;
     if (~passing) begin
       to_enter <= collisions;
       to_fill  <= filled_first;
@@ -148,78 +147,107 @@ module queue #(
     end
   end
 
-  // ---- Candidates
+  // ---- The first place that is asked for: free, or without the one that issues the oldest. One that enters is
+  // the oldest if there is no other.
 
-  localparam [SLOTS-1:0] ONE = 1;
-  wire [SLOTS-1:0] place_s1 = comes_s1 ? ONE << slot_s1 : {SLOTS{1'b0}};
-  wire [SLOTS-1:0] place_s3 = comes_s3 ? ONE << slot_s3 : {SLOTS{1'b0}};
-  wire [SLOTS-1:0] place_s5 = comes_s5 ? ONE << slot_s5 : {SLOTS{1'b0}};
-  wire [SLOTS-1:0] enter    = enters ? ONE << entry : {SLOTS{1'b0}};
-  reg  [SLOTS-1:0] entered, free, pick, oldest, common;
-  wire [SLOTS-1:0] entered_next = (entered & ~pick) | enter;
-  wire [SLOTS-1:0] in_conflict;      // with the collision that comes
-  wire [SLOTS-1:0] older_met, conflict_met, over;
-
-  // Among the asked: the ones that no other is older than.
-  wire [SLOTS-1:0] asked      = phase ? free : entered & ~pick;
-  wire [SLOTS-1:0] first_of   = asked & ~older_met;
-  pair_matrix #(.SLOTS(SLOTS), .ORDER(1)) order (
-    .clk(clk), .place(place_s3), .below({SLOTS{1'b1}}), .above({SLOTS{1'b0}}), .ask(asked), .met(older_met)
-  );
-  pair_matrix #(.SLOTS(SLOTS)) conflicts (
-    .clk(clk), .place(place_s3), .below(in_conflict), .above(in_conflict),
-    .ask(phase ? oldest : pick), .met(conflict_met)
+  localparam WIDTH = SLOT + 2*BODY + 2;
+  reg  [SLOTS-1:0] renewed;          // had a body in common with the one that issued in the slot before
+  reg  [DEPTH-1:0] not_held, pick, oldest, from_pick;
+  wire [DEPTH-1:0] free  = not_held & ~renewed[DEPTH-1:0];
+  wire [DEPTH:0]   asked = phase ? {1'b0, free} : {1'b1, occupied[DEPTH-1:0] & ~pick};
+  wire [DEPTH:0]   from_first, first_of;
+  wire [WIDTH*(DEPTH+1)-1:0] records_of;       // where the record of a place is, and its bodies
+  wire [WIDTH-1:0] first_record;
+  queue_first #(.PLACES(DEPTH + 1), .WIDTH(WIDTH)) of_the_places (
+    .asked(asked), .records(records_of), .from(from_first), .first(first_of), .record(first_record)
   );
 
-  reg  [SLOT-1:0] first_slot;
-  integer n;
-  always @* begin
-    first_slot = {SLOT{1'b0}};
-    for (n = 0; n < SLOTS; n = n + 1) first_slot = first_slot | (n[SLOT-1:0] & {SLOT{first_of[n]}});
-  end
+  // ---- Places
 
-  // Slots of patience in which the oldest one did not issue.
-  reg  [10:0] patience;
-  reg         out_of_patience;
-  wire        oldest_goes = |(pick & oldest);
+  // What places have behind a cycle in which these of them take over from the next one.
+  function [SLOTS-1:0] moved;
+    input [SLOTS-1:0] moves, of;
+    moved = (moves & (of >> 1)) | (~moves & of);
+  endfunction
+
+  reg  [COMING-1:0] fresh;           // the place of the collision at stages 4 and 5
+  reg  [SLOTS-1:0]  held;            // not free since an earlier slot
+  reg  [DEPTH:0]    common;          // with the oldest
+  wire [SLOTS-1:0]  moves = {{COMING{enters}}, {DEPTH{enters}} & from_pick};
+  // A collision comes to the first place behind the queue that is empty then.
+  wire [COMING-1:0] behind = occupied[SLOTS-1:DEPTH];
+  wire [COMING-1:0] place  = {COMING{comes_s3}}
+                           & (enters ? behind & ~(behind >> 1) : ~behind & {behind[COMING-2:0], 1'b1});
+  wire [SLOTS-1:0]  told   = {fresh, {DEPTH{1'b0}}};
+  wire [SLOTS-1:0]  meets, over;
+  wire              holds_s5 = held_s5 & ~(passes_slot & (free_at_s5 == slot_after));
+  wire [SLOTS-1:0]  holds    = (told & {SLOTS{holds_s5}}) | (~told & (held | renewed) & ~over);
+
+  reg  [10:0] patience;              // slots in which the oldest one did not issue
+  reg         out_of_patience, oldest_goes;
   wire        blocks = ~oldest_goes & (out_of_patience | (decides & (patience == PATIENCE - 11'd1)));
+  wire [SLOTS-1:0] blocked = {{(COMING-1){1'b0}}, common} & {SLOTS{blocks}};
+  wire [SLOTS-1:0] stays   = occupied & {{COMING{1'b1}}, ~pick};
+  wire [SLOTS-1:0] frees   = moved(moves, stays & ~holds & ~blocked);
+  wire [SLOTS-1:0] firsts  = moved(moves, {{(COMING-1){1'b0}}, first_of});
+  wire unused = &{1'b0, frees, firsts, from_first[DEPTH]};   // those of the places behind the queue
   always @(posedge clk) begin
-    if (~phase) oldest <= first_of;
-    if (phase) common <= conflict_met;
-    pick <= (phase & passing & ~filling & ~owed & has_room) ? first_of : {SLOTS{1'b0}};
-    some_free <= |free;
-    if (phase) pick_slot <= first_slot;
-    if (~passing) {out_of_patience, patience} <= 12'd0;
-    else if (oldest_goes) {out_of_patience, patience} <= 12'd0;
+    {asked_slot, asked_a, asked_b, asked_moves_a, asked_moves_b} <= first_record;
+    if (phase & ~will_decide) {asked_moves_a, asked_moves_b} <= 2'b00;
+    pick        <= first_of[DEPTH-1:0] & {DEPTH{will_decide}};
+    some_free   <= |free;
+    oldest_goes <= will_decide & |(oldest & free);
+    if (~passing) from_pick <= {DEPTH{1'b1}};
+    else if (will_decide) from_pick <= from_first[DEPTH-1:0];
+
+    if (phase) common <= meets[DEPTH:0] & {1'b1, ~oldest};
+    else begin
+      oldest        <= firsts[DEPTH-1:0];
+      occupied      <= moved(moves, stays) | {place, {DEPTH{1'b0}}};
+      fresh         <= place;
+      not_held      <= frees[DEPTH-1:0];
+      held          <= moved(moves, holds);
+      renewed       <= moved(moves, meets);
+    end
+    if (clear) occupied <= {SLOTS{1'b0}};
+    if (~passing) begin
+      not_held <= {DEPTH{1'b0}};
+      held     <= {SLOTS{1'b0}};
+      {out_of_patience, patience} <= 12'd0;
+    end else if (oldest_goes) {out_of_patience, patience} <= 12'd0;
     else if (decides & ~out_of_patience) begin
       patience        <= patience + 11'd1;
       out_of_patience <= blocks;
     end
-    if (~passing) {entered, free} <= {2*SLOTS{1'b0}};
-    else if (~phase) begin
-      entered <= entered_next;
-      free    <= entered_next & over & ~(common & {SLOTS{blocks}});
-    end
   end
 
+  wire [WIDTH-1:0] in [0:SLOTS];
+  wire [7:0]       in_free_at [0:SLOTS];
+  assign in[SLOTS]       = {slot_s3, a_s3, b_s3, moves_a_s3, moves_b_s3};
+  assign in_free_at[SLOTS] = free_at_s5;
   genvar i;
   generate
-    for (i = 0; i < SLOTS; i = i + 1) begin : g_slot
+    for (i = 0; i < SLOTS; i = i + 1) begin : g_place
+      reg [SLOT-1:0] slot;
       reg [BODY-1:0] a, b;
       reg            moves_a, moves_b;
-      reg            a_is_a, a_is_b, b_is_a, b_is_b;   // numbers of the one that comes, and of this one
-      reg [7:0]      timer;
-      wire [7:0]     slots = place_s5[i] ? slots_s5 : timer;
-      assign in_conflict[i] = (moves_a_s3 & ((a_is_a & moves_a) | (a_is_b & moves_b)))
-                            | (moves_b_s3 & ((b_is_a & moves_a) | (b_is_b & moves_b)));
-      assign over[i]  = ~conflict_met[i] & ((slots == 8'd0) | ((slots == 8'd1) & passes_slot));
+      reg [7:0]      free_at;
+      wire           comes = (i >= DEPTH) & place[(i >= DEPTH) ? i - DEPTH : 0];
+      assign in[i]       = {slot, a, b, moves_a, moves_b};
+      assign in_free_at[i] = told[i] ? free_at_s5 : free_at;
+      if (i <= DEPTH) begin : g_record
+        assign records_of[WIDTH*i +: WIDTH] = in[i];
+      end
+      assign over[i]  = passes_slot & (free_at == slot_after);
+      assign meets[i] = (asked_moves_a & ((moves_a & (a == asked_a)) | (moves_b & (b == asked_a))))
+                      | (asked_moves_b & ((moves_a & (a == asked_b)) | (moves_b & (b == asked_b))));
       always @(posedge clk) begin
-        if (place_s1[i]) {a, b} <= {a_s1, b_s1};
-        {a_is_a, a_is_b, b_is_a, b_is_b} <= {a_s2 == a, a_s2 == b, b_s2 == a, b_s2 == b};
-        if (place_s3[i]) {moves_a, moves_b} <= {moves_a_s3, moves_b_s3};
-        if (~passing) timer <= 8'd0;
-        else if (~phase) timer <= conflict_met[i] ? HELD
-                                : (passes_slot & (slots != 8'd0)) ? slots - 8'd1 : slots;
+        if (comes) {slot, a, b, moves_a, moves_b} <= in[SLOTS];
+        else if (moves[i]) {slot, a, b, moves_a, moves_b} <= in[i+1];
+        if (phase) begin
+          if (renewed[i]) free_at <= issue_free_at;
+        end else if (moves[i]) free_at <= in_free_at[i+1];
+        else if (told[i]) free_at <= free_at_s5;
       end
     end
   endgenerate

@@ -1,4 +1,4 @@
-// For each collision that comes into the queue: the slots until no collision that has issued before
+// For each collision that comes into the queue: the slot from which on no collision that has issued before
 // writes one of its bodies. Later issues find it in the queue.
 //
 // A memory beside the finder has for each body {parity of the pass, ordinal of the issue} of its last
@@ -25,7 +25,10 @@ module queue_hazard #(
   input  wire [COLLISION:0]   use_b_s2,
   input  wire                 moves_a_s3,
   input  wire                 moves_b_s3,
-  output reg  [7:0]           slots_s5,       // until it is free
+  output reg                  held_s5,        // it is not free yet
+  output reg  [7:0]           free_at_s5,     // the slot from which on it is, modulo 256
+  output reg  [7:0]           slot_after,     // the slot behind this one, modulo 256
+  output reg  [7:0]           issue_free_at,  // the slot from which on the bodies of the last issue are free
 
   // Issues in the two slots before.
   input  wire [BODY-1:0]      early_a,
@@ -43,6 +46,7 @@ module queue_hazard #(
   reg  [COLLISION-1:0] issued, over;          // issues of the pass; issues whose write-back can be read
   reg  [WINDOW-2:0]    under_way;             // one bit a slot, the newest in bit 0
   reg  [7:0]           slot;                  // number of the slot, modulo 256
+  wire [7:0]           free_at = slot + SLOTS;
   reg  [COLLISION:0]   early_use, last_a_s3, last_b_s3;
   (* ram_style = "distributed" *) reg [7:0] ends [0:255];
   // Low bits of ordinals, also where these are short.
@@ -52,16 +56,19 @@ module queue_hazard #(
   wire                 unused    = &{1'b0, ordinal, ordinal_a, ordinal_b};
 
   always @(posedge clk) begin
-    if (issues) ends[ordinal[7:0]] <= slot + SLOTS;
+    if (issues) ends[ordinal[7:0]] <= free_at;
+    if (issues) issue_free_at <= free_at;
     if (idle) begin
       {issued, over} <= {(2*COLLISION){1'b0}};
       under_way      <= {(WINDOW-1){1'b0}};
       slot           <= 8'd0;
+      slot_after     <= 8'd1;
     end else if (passes_slot) begin
       issued    <= issued + {{(COLLISION-1){1'b0}}, issues};
       over      <= over + {{(COLLISION-1){1'b0}}, under_way[WINDOW-2]};
       under_way <= {under_way[WINDOW-3:0], issues};
-      slot      <= slot + 8'd1;
+      slot       <= slot_after;
+      slot_after <= slot_after + 8'd1;
     end
     if (issues) early_use <= {parity, issued};
     use_of_body <= early_use;
@@ -82,6 +89,7 @@ module queue_hazard #(
   wire [7:0]         slots_b = hazard_b_s4 ? end_b_s4 - slot : 8'd0;
   wire last_has_a = (early_moves_a & (early_a == a_s4)) | (early_moves_b & (early_b == a_s4));
   wire last_has_b = (early_moves_a & (early_a == b_s4)) | (early_moves_b & (early_b == b_s4));
+  wire last_has   = (moves_a_s4 & last_has_a) | (moves_b_s4 & last_has_b);
   always @(posedge clk) begin
     {a_s3, b_s3}           <= {a_s2, b_s2};
     {a_s4, b_s4}           <= {a_s3, b_s3};
@@ -92,8 +100,8 @@ module queue_hazard #(
     end_b_s4    <= ends[ordinal_b[7:0]];
     {moves_a_s4, moves_b_s4} <= {moves_a_s3, moves_b_s3};
     // The issue in the slot before is the newest that there can be.
-    slots_s5 <= ((moves_a_s4 & last_has_a) | (moves_b_s4 & last_has_b)) ? SLOTS - 8'd1
-              : (slots_a > slots_b) ? slots_a : slots_b;
+    held_s5    <= last_has | (slots_a != 8'd0) | (slots_b != 8'd0);
+    free_at_s5 <= last_has ? issue_free_at : (slots_a > slots_b) ? end_a_s4 : end_b_s4;
   end
 endmodule
 

@@ -16,8 +16,7 @@ module queue_records #(
   input  wire             phase,
 
   // Slots, in the order in which they are given.
-  output wire             free,       // there is one
-  output wire [SLOT-1:0]  next,
+  output wire [SLOT-1:0]  next,       // of the one that is taken: the queue lets the finder take no more than there are
   input  wire             take,
   input  wire             release_slot,
   input  wire [SLOT-1:0]  released,
@@ -49,8 +48,7 @@ module queue_records #(
   wire [SLOT-1:0] freed, loading;
   wire [SLOT:0]   freed_left, loading_left;
   wire            some_freed, some_loading, freed_below, loading_below;
-  wire            unused = &{1'b0, freed_left, loading_left, freed_below, loading_below};
-  assign free = ~none_fresh | some_freed;
+  wire            unused = &{1'b0, freed_left, loading_left, some_freed, freed_below, loading_below};
   assign next = none_fresh ? freed : fresh;
   always @(posedge clk) begin
     if (clear) {none_fresh, fresh} <= {1'b0, {SLOT{1'b0}}};
@@ -68,15 +66,16 @@ module queue_records #(
   (* ram_style = "distributed" *) reg [511:0]     first_rows [0:SLOTS-1];
   (* ram_style = "distributed" *) reg [511:0]     rest_rows [0:SLOTS-1];
   (* ram_style = "distributed" *) reg [FACTS-1:0] found [0:SLOTS-1];
-  reg [SLOT-1:0] loading_rest;
+  reg [SLOT-1:0] loading_rest, slot_rest;
   reg [SLOT:0]   waiting;
   assign first = first_rows[slot];
-  assign rest  = rest_rows[slot];
+  assign rest  = rest_rows[slot_rest];
   assign facts = found[slot];
   always @(posedge clk) begin
     loads        <= phase & some_loading & beats_there & ~clear;
     loads_rest   <= loads & ~clear;
     loading_rest <= loading;
+    slot_rest    <= slot;
     if (loads) first_rows[loading] <= beats;
     if (loads_rest) rest_rows[loading_rest] <= beats;
     if (facts_come) found[facts_slot] <= facts_in;

@@ -176,11 +176,25 @@ pub const MUTATIONS: &[Mutation] = &[
         wrong: "begin_packet(next_segment, warm_start);",
     },
     Mutation {
-        name: "the youngest collision of the queue goes first",
+        name: "the oldest collision of the queue lets every other one go first",
         inertia: Inertia::Isotropic,
         file: "queue.v",
-        right: ".below({SLOTS{1'b1}}), .above({SLOTS{1'b0}})",
-        wrong: ".below({SLOTS{1'b0}}), .above({SLOTS{1'b1}})",
+        right: "{1'b0, free} :",
+        wrong: "{1'b0, free & ~(oldest & {DEPTH{|(free & ~oldest)}})} :",
+    },
+    Mutation {
+        name: "the queue takes the place of a collision from the one behind it alone",
+        inertia: Inertia::Isotropic,
+        file: "queue.v",
+        right: "from_pick <= from_first[DEPTH-1:0];",
+        wrong: "from_pick <= first_of[DEPTH-1:0];",
+    },
+    Mutation {
+        name: "the queue counts the hazards of collisions that pass the oldest one",
+        inertia: Inertia::Isotropic,
+        file: "queue.v",
+        right: "meets_hazard <= oldest_goes & held_before",
+        wrong: "meets_hazard <= issues & held_before",
     },
     Mutation {
         name: "a collision that comes into the queue misses an issue that is not written",
@@ -211,11 +225,11 @@ pub const MUTATIONS: &[Mutation] = &[
         wrong: "PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW + 1;",
     },
     Mutation {
-        name: "a collision in conflict is free a slot early",
+        name: "a collision that waits in the queue is free a slot early",
         inertia: Inertia::Isotropic,
         file: "queue.v",
-        right: "HELD     = WINDOW - 1;",
-        wrong: "HELD     = WINDOW - 2;",
+        right: "& (free_at == slot_after);",
+        wrong: "& (free_at == slot_after + 8'd1);",
     },
     Mutation {
         name: "the last beat of numbers keeps words of the one before",

@@ -24,29 +24,30 @@ const PARTS: [(&str, Of, [[f64; 2]; 2]); 8] = [
     ("detection", Of::Collision, [[936.0, 873.0], [870.0, 870.0]]),
     ("points", Of::Collision, [[0.0, 129.0], [0.0, 141.0]]),
     ("order", Of::Collision, [[1.4, 1.4], [1.3, 1.3]]),
-    ("pack", Of::Collision, [[264.0, 578.0], [359.0, 597.0]]),
+    ("pack", Of::Collision, [[242.0, 484.0], [337.0, 560.0]]),
     ("bodies", Of::Body, [[119.0, 119.0], [130.0, 130.0]]),
-    ("results", Of::Body, [[49.0, 49.0], [48.0, 48.0]]),
-    ("commit", Of::Collision, [[0.0, 104.0], [0.0, 136.0]]),
-    ("driver", Of::Collision, [[16.0, 21.0], [9.5, 9.5]]),
+    ("results", Of::Body, [[75.0, 75.0], [74.0, 74.0]]),
+    ("commit", Of::Collision, [[0.0, 194.0], [0.0, 205.0]]),
+    ("driver", Of::Collision, [[7.4, 12.4], [1.0, 1.4]]),
 ];
 
 /// The place of the detection, which is no part of the driver.
 const DETECTION: usize = 0;
 
-/// What a part takes its time for.
+/// The item that a part handles.
 enum Of {
     Collision,
     Body,
 }
 
-/// What each part takes on four cores, ms; a sum over steps.
+/// The time of each part on four cores, ms; a sum over steps.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HostTimes([f64; PARTS.len()]);
 
 impl HostTimes {
-    /// Of one step, with the detection if it `detects`; none of a board that is not emulated, of
-    /// streams in sixteen bits, and of an order that the host computes: they are not counted.
+    /// The times of one step, with the detection if it `detects`. `None` for a board that is not
+    /// emulated, for streams in sixteen bits, and for an order that the host computes: the script
+    /// does not count them.
     pub(crate) fn of(
         accelerator: &Accelerator,
         report: &StepReport,
@@ -71,13 +72,13 @@ impl HostTimes {
         counted.then_some(Self(parts))
     }
 
-    /// Adds those of another step.
+    /// Adds the times of another step.
     pub(crate) fn and(self, other: Self) -> Self {
         Self(std::array::from_fn(|part| self.0[part] + other.0[part]))
     }
 
     /// The mean of a step, for people, and what limits beside `board` ms.
-    pub(crate) fn text(&self, steps: u32, board: f64) -> String {
+    pub(crate) fn text(self, steps: u32, board: f64) -> String {
         let [detection, driver @ ..] = self.0.map(|ms| ms / f64::from(steps.max(1)));
         let driver: f64 = driver.iter().sum();
         let limit = |host: f64| if host > board { "host" } else { "board" };
@@ -95,7 +96,7 @@ impl HostTimes {
     }
 
     /// For programs: the parts, and all of them but the detection.
-    pub(crate) fn to_json(&self) -> Value {
+    pub(crate) fn to_json(self) -> Value {
         let parts =
             PARTS.iter().zip(self.0).map(|((name, ..), ms)| ((*name).to_owned(), ms.into()));
         let mut parts: Map<String, Value> = parts.collect();

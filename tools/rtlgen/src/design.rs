@@ -274,9 +274,9 @@ mod tests {
         assert_eq!(with(64, false).check(), Err(BuildError::UncheckedQueue { queue: 64 }));
     }
 
-    /// The timers of the queue have eight bits.
+    /// The queue counts slots in eight bits.
     #[test]
-    fn the_window_of_a_queue_fits_its_timers() {
+    fn the_window_of_a_queue_fits_its_count_of_slots() {
         assert_eq!(Design::new(Parameters::default()).window_slots(), 162);
         for inertia in FORMS {
             let parameters =

@@ -33,8 +33,8 @@ pub const AROUND: &[Source<'_>] = sources! {
     "stream/": "word_sum", "receiver", "sender";
     "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator", "step_sequence";
     "operators/": "half_to_float";
-    "pass/": "finder", "issue", "pair_matrix", "queue_records", "queue_hazard", "queue", "issue_numbers",
-        "impulses", "impulse_sum";
+    "pass/": "finder", "issue", "queue_records", "queue_hazard", "queue_first", "queue",
+        "issue_numbers", "impulses", "impulse_sum";
     "": "core", "control_block", "pgs_top";
 };
 

@@ -1,9 +1,9 @@
 //! Builds the scene and holds its bodies and collisions.
 
 use pgs_support::float_env::standard;
-use zynq_pgs::{Body, Collision, Contact, Pose, Shape, Velocity};
+use zynq_pgs::{Body, Collision, Pose, Shape, Velocity};
 
-use crate::detect::{self, DetectionTimes, Detector, Geometries};
+use crate::detect::{DetectionTimes, Detector, Geometries};
 use crate::{CUBE_HALF_EXTENT, GROUND, GROUND_HALF_EXTENT, Geometry, Grid, SceneError};
 
 /// Largest drop, m.
@@ -179,14 +179,6 @@ impl Scene {
     /// list is sorted, and the ground has no part in it.
     pub fn pairs(&self) -> impl Iterator<Item = (u32, u32)> {
         standard(|| self.detector.pairs().collect::<Vec<_>>()).into_iter()
-    }
-
-    /// All contact points of two bodies, on the surface of `b`: [`detect`](Self::detect) chooses
-    /// up to four of them; with the ground the chosen ones. `None` if the narrow phase never asks
-    /// for this pair: the ground, body 0, can only be `a`.
-    #[must_use]
-    pub fn all_points(&self, a: u32, b: u32) -> Option<Vec<Contact>> {
-        standard(|| detect::all_points(&self.bodies, Geometries(&self.geometries), a, b))
     }
 
     /// Gives each collision a friction of its own from now on: the geometric mean of the frictions

@@ -60,14 +60,6 @@ pub enum SceneError {
         /// The numbers, m for a position.
         found: Vec<f32>,
     },
-    /// No spheres, or too many.
-    #[error("expected 1 to {most} spheres, found {found}")]
-    Spheres {
-        /// Spheres asked for.
-        found: u32,
-        /// Most spheres.
-        most: u32,
-    },
     /// The sizes or the mass of a body are out of range.
     #[error(transparent)]
     Shape(#[from] ShapeError),

@@ -1,5 +1,4 @@
-//! The box-on-plane scene of the thesis, a scene of several shapes and a pile of spheres, with
-//! collision detection.
+//! The box-on-plane scene of the thesis and a scene of several shapes, with collision detection.
 //!
 //! A grid of cubes above a plane, as Bullet's demo `box on plane` builds it. A [`Scene`] holds the
 //! bodies and the collisions of their current poses; the accelerator steps them:
@@ -18,7 +17,6 @@
 //!
 //! [`Scene::of_shapes`] is a pile of cubes, spheres, boxes, capsules, cylinders and convex hulls of
 //! several masses instead, and [`Scene::of_cubes`] has any poses.
-//! [`Spheres`] is an irregular pile, for tests of the order of collisions.
 //!
 //! The bits of every result are the same on every architecture and with every number of threads:
 //! arithmetic is f32 in a written order, parry3d is built with `enhanced-determinism`, and neither
@@ -37,7 +35,6 @@ mod measure;
 mod poses;
 mod rotation;
 mod shapes;
-mod spheres;
 mod warm_start;
 
 pub use build::{DROP_MAX, Scene, SceneOptions};
@@ -47,13 +44,12 @@ pub use geometry::Geometry;
 pub use grid::Grid;
 pub use hull::faces as hull_faces;
 pub use measure::{
-    KineticEnergy, Momentum, Penetration, axes, carry_along, ground_pairs, kinetic_energy,
+    KineticEnergy, Momentum, Penetration, carry_along, ground_pairs, kinetic_energy,
     kinetic_energy_before_gravity, kinetic_energy_parts, momentum, moving_mass, penetration,
     potential_energy,
 };
 pub use pgs_support::random::SplitMix64;
 pub use shapes::{SHAPE_FRICTIONS, ShapesOptions};
-pub use spheres::{RADII, SPHERES_MAX, Spheres};
 pub use warm_start::WarmStart;
 
 /// Index of the static ground among the bodies.

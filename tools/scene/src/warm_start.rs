@@ -83,7 +83,11 @@ mod tests {
         // Too far away.
         new[4].contacts.iter_mut().for_each(|contact| contact.point[2] = 0.06);
         let placed = warm.placed(&new, 1.0).expect("places");
-        let found: Vec<_> = (0..new.len()).map(|index| placed.impulses(index)).collect();
+        let found: Vec<_> = new
+            .iter()
+            .enumerate()
+            .map(|(at, of)| placed.impulses(at, of.normal, of.points()))
+            .collect();
         let of = |normal, at| Impulses { normal, friction: [at, 0.0] };
         let none = Impulses::ZERO;
         let (ahead, behind) = ([1.0, 2.0, 3.0, 4.0], [4.0, 3.0, 2.0, 1.0]);

@@ -5,7 +5,7 @@
 
 use pgs_support::float_env::foreign::{Environment, environments, under};
 use pgs_support::float_env::standard;
-use scene::{Scene, SceneOptions, ShapesOptions, Spheres};
+use scene::{Scene, SceneOptions, ShapesOptions};
 use zynq_pgs::{Body, Collision};
 
 /// The bodies and collisions of a pile of each kind, found with this many threads.
@@ -19,13 +19,12 @@ fn piles(
     // Halves the distances, so that the bodies touch.
     let halve = |body: &mut Body| body.pose.position = body.pose.position.map(|x| 0.5 * x);
     standard(|| several.bodies_mut().iter_mut().skip(1).for_each(halve));
-    let spheres = Spheres::new(50, 3).expect("few enough");
     let found = [cubes, several].into_iter().map(|mut scene| {
         scene.set_threads(threads);
         let collisions = scene.detect().to_vec();
         (scene.bodies().to_vec(), collisions)
     });
-    found.chain([(spheres.bodies().to_vec(), spheres.collisions().to_vec())]).collect()
+    found.collect()
 }
 
 #[test]

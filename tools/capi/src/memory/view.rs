@@ -288,7 +288,7 @@ impl Collisions for CollisionsView<'_> {
         self.dense.map(Structures::Array)
     }
 
-    fn impulses(&self, index: usize) -> Impulses {
+    fn impulses(&self, index: usize, _: [f32; 3], _: u32) -> Impulses {
         assert!(index < self.count, "collision {index} of {}", self.count);
         // SAFETY: the index is below the count, and nothing writes the array.
         self.impulses.as_ref().map_or(Impulses::ZERO, |column| unsafe { column.get(index) })

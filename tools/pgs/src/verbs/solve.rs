@@ -422,7 +422,7 @@ impl StepResult {
             })
             .collect();
         let mut step = pgs_command::output::report_json(&self.report);
-        step["host_on_a53_ms"] = self.a53.map(|host| host.to_json()).into();
+        step["host_on_a53_ms"] = self.a53.map(HostTimes::to_json).into();
         json!({
             "schema": SCHEMA,
             "verb": "solve",

@@ -69,7 +69,7 @@ fn contact_arrays_of_nothing_are_no_collisions_whatever_their_type() {
         assert_eq!((ran.code, &ran.stdout), (Some(0), &expected.stdout), "{descr}: {}", ran.stderr);
         for verb in [
             &["thesis", "formats", "--input"][..],
-            &["thesis", "order", "--runs", "1", "--input"],
+            &["thesis", "order", "--input"],
             &["thesis", "compare", "float", "half", "--input"],
         ] {
             let ran = with_folder(verb, &folder);
@@ -117,7 +117,7 @@ fn a_step_without_bodies_is_a_step_unless_a_collision_names_one() {
                 &["solve"][..],
                 &["solve", "--json"],
                 &["thesis", "formats", "--input"],
-                &["thesis", "order", "--runs", "1", "--input"],
+                &["thesis", "order", "--input"],
                 &["thesis", "compare", "float", "half", "--input"],
             ] {
                 let ran = with_folder(verb, &folder);

@@ -207,7 +207,6 @@ fn in_small(command: &str) -> Option<String> {
         ("thesis", "streams" | "ports" | "warm" | "comparison" | "euler") => {}
         ("thesis", "mixed" | "windowed") => {}
         _ if has(&words, "--help") || has(&words, "--version") => {}
-        ("thesis", "order") if has(&words, "--spheres") => with(&mut words, "--spheres", "200"),
         ("thesis", "stopping") => {
             with(&mut words, "--passes", "16");
             if !has(&words, "--input") {

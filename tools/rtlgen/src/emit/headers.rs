@@ -141,8 +141,8 @@ fn capabilities(text: &mut Text, design: &Design) {
     constant(text, 32, "BYTES_PER_COLLISION", collision);
 }
 
-/// Slots of the queue beside its depth: of collisions that have left the finder and not entered.
-/// From the issue that empties a slot to the entry of the next collision in it there are three.
+/// Places of the queue beside its depth: of collisions that have left the finder and not entered.
+/// From the entry that empties one to the entry of the next collision in it there are three slots.
 const QUEUE_COMING: u32 = 4;
 /// Width of the AXI DMAs' length registers (specification, section 5).
 pub(super) const LENGTH_BITS: u32 = 26;

@@ -8,7 +8,6 @@
 mod bounds;
 mod broad;
 mod cells;
-mod choice;
 mod ground;
 mod narrow;
 mod parry;
@@ -23,7 +22,6 @@ use zynq_pgs::{Body, Collision};
 
 use bounds::{Bounds, GAP};
 use broad::{Broad, Drift};
-pub(crate) use choice::all_points;
 use narrow::{Narrow, Touch};
 
 use crate::Geometry;

@@ -24,13 +24,6 @@ pub fn ground_pairs(collisions: &[Collision]) -> usize {
     collisions.iter().filter(|c| c.body_a == GROUND || c.body_b == GROUND).count()
 }
 
-/// The axes of a body in the world, of unit length.
-#[must_use]
-pub fn axes(body: &Body) -> [[f64; 3]; 3] {
-    let rows = rotation(body.pose.orientation);
-    [0, 1, 2].map(|axis| rows.map(|row| row[axis]))
-}
-
 /// The moving bodies, each with its shape.
 fn moving<'a>(
     bodies: &'a [Body],

@@ -45,7 +45,7 @@ change is a word: f32, binary16 (arithmetic), interlocked, unchecked, isotropic,
 queue=DEPTH, window=SLOTS,
 bandwidth=GBPS, length-width=BITS, address-width=BITS, threads=N and
 fast=on|off. The order of a board's collisions is one of auto, as-given, interleaved,
-hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, colours, gpu,
+hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, gpu,
 random=SEED (another one in each step). Without an order, a board that waits on hazards takes the
 collisions as given, so that two such boards solve them in the same order. Each board detects its
 own collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in

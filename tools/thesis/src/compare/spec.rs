@@ -79,8 +79,8 @@ mod tests {
         let side: SideSpec = "float,order=as-given,unchecked".parse().expect("the same");
         assert_eq!(side.to_string(), "float,unchecked,as-given");
         let error = "float,sorted".parse::<SideSpec>().expect_err("no such word");
-        assert!(error.contains("sorted") && error.contains("colours"), "{error}");
-        let error = "float,colours,as-given".parse::<SideSpec>().expect_err("two orders");
+        assert!(error.contains("sorted") && error.contains("gpu"), "{error}");
+        let error = "float,gpu,as-given".parse::<SideSpec>().expect_err("two orders");
         assert_eq!(error, "order is given twice");
         "hazard-free".parse::<SideSpec>().expect_err("no profile");
     }

@@ -5,14 +5,13 @@
 
 pub(crate) mod body_by_body;
 mod cells;
-pub(crate) mod colours;
 
 use std::path::Path;
 
 use pgs_command::failure::{Failure, Result};
 use scene::SplitMix64;
 use step_folder::npy::{self, Dimensions};
-use zynq_pgs::order::{InputBuffers, OrderInput};
+use zynq_pgs::order::InputBuffers;
 use zynq_pgs::{Body, Collision, Shape};
 
 use self::body_by_body::Ties;
@@ -29,16 +28,13 @@ pub(crate) enum Permutation {
     Random(u64),
     /// The order of Bullet's GPU.
     Gpu,
-    /// Greedy colouring: no hazards if colours are large, nearly all bodies alive.
-    Colours,
     /// The thesis' Algorithm 3: few bodies alive, nearly all collisions hazardous.
     BodyByBody(Ties),
 }
 
 /// The orders without a seed, as they are written.
-const WORDS: [(&str, Permutation); 5] = [
+const WORDS: [(&str, Permutation); 4] = [
     ("gpu", Permutation::Gpu),
-    ("colours", Permutation::Colours),
     ("body-by-body", Permutation::BodyByBody(Ties::LowestIndex)),
     ("body-by-body-oldest", Permutation::BodyByBody(Ties::Oldest)),
     ("body-by-body-newest", Permutation::BodyByBody(Ties::Newest)),
@@ -69,39 +65,21 @@ impl Permutation {
 /// Puts the collisions of one step after the other in an order.
 #[derive(Debug)]
 pub(crate) struct Arranger {
-    source: Source,
+    permutation: Permutation,
+    /// The numbers of random orders.
+    random: SplitMix64,
+    /// The order of Bullet's GPU in the only step, where it is known.
+    recorded: Option<Vec<u32>>,
     buffers: InputBuffers,
     arranged: Vec<Collision>,
 }
 
-#[derive(Debug)]
-enum Source {
-    Random(SplitMix64),
-    /// The order of the only step.
-    Given(Vec<u32>),
-    /// By the cells of Bullet's GPU.
-    Cells,
-    Made(Making),
-}
-
-/// Makes an order of an input that was checked.
-pub(crate) type Making = fn(&OrderInput<'_>) -> Vec<u32>;
-
 impl Arranger {
     /// Prepares an order. `recorded` is the order of Bullet's GPU, where it is known.
     pub(crate) fn new(permutation: Permutation, recorded: Option<Vec<u32>>) -> Self {
-        let source = match (permutation, recorded) {
-            (Permutation::Random(seed), _) => Source::Random(SplitMix64::new(seed)),
-            (Permutation::Gpu, Some(order)) => Source::Given(order),
-            (Permutation::Gpu, None) => Source::Cells,
-            (Permutation::Colours, _) => Source::Made(|input| colours::order(input).0),
-            (Permutation::BodyByBody(ties), _) => Source::Made(match ties {
-                Ties::LowestIndex => |input| body_by_body::order(input, Ties::LowestIndex),
-                Ties::Oldest => |input| body_by_body::order(input, Ties::Oldest),
-                Ties::Newest => |input| body_by_body::order(input, Ties::Newest),
-            }),
-        };
-        Self { source, buffers: InputBuffers::new(), arranged: Vec::new() }
+        let seed = if let Permutation::Random(seed) = permutation { seed } else { 0 };
+        let (random, buffers) = (SplitMix64::new(seed), InputBuffers::new());
+        Self { permutation, random, recorded, buffers, arranged: Vec::new() }
     }
 
     /// The collisions of the next step in their order. Where one of them has a body that does not
@@ -117,26 +95,16 @@ impl Arranger {
         if input.taking_part().any(|(_, pair)| !pair.into_iter().all(exists)) {
             return collisions;
         }
-        let made;
-        let order = match &mut self.source {
-            Source::Random(random) => {
-                made = shuffled(random, collisions.len());
-                &made
-            }
-            Source::Given(order) => order,
-            Source::Cells => {
-                made = cells::order(&input, bodies);
-                &made
-            }
-            Source::Made(making) => {
-                made = making(&input);
-                &made
-            }
+        let order = match (self.permutation, &self.recorded) {
+            (Permutation::Random(_), _) => shuffled(&mut self.random, collisions.len()),
+            (Permutation::Gpu, Some(recorded)) => recorded.clone(),
+            // By the cells of Bullet's GPU.
+            (Permutation::Gpu, None) => cells::order(&input, bodies),
+            (Permutation::BodyByBody(ties), _) => body_by_body::order(&input, ties),
         };
+        let collision = |index: u32| collisions.get(usize::try_from(index).ok()?).copied();
         self.arranged.clear();
-        self.arranged.extend(order.iter().filter_map(|index| {
-            usize::try_from(*index).ok().and_then(|index| collisions.get(index)).copied()
-        }));
+        self.arranged.extend(order.into_iter().filter_map(collision));
         &self.arranged
     }
 }

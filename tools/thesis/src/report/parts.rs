@@ -143,10 +143,7 @@ impl AllArgs {
             ("formats", step(format!("--step {}", self.step))),
             (
                 "order",
-                with(
-                    step(format!("--drop {DROP} --steps {before}")),
-                    &format!("--depth {DEPTH} --runs 1"),
-                ),
+                with(step(format!("--drop {DROP} --steps {before}")), &format!("--depth {DEPTH}")),
             ),
             ("time-step", either("--grid 4x4x4", "--grid 8x8x8 --seconds 4")),
             ("stopping", either("--passes 32", "--passes 128 --grid 10x10x10")),

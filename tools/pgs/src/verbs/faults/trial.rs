@@ -181,7 +181,11 @@ impl State {
         let mut after = Vec::new();
         let collisions = scene.collisions().to_vec();
         let placed = warm.placed(&collisions, 1.0).map_err(Failure::input)?;
-        let impulses: Vec<_> = (0..collisions.len()).map(|at| placed.impulses(at)).collect();
+        let impulses: Vec<_> = collisions
+            .iter()
+            .enumerate()
+            .map(|(at, of)| placed.impulses(at, of.normal, of.points()))
+            .collect();
         let (port, mut takes) = (emulated.cpu_port(), Duration::ZERO);
         // From the second step on the channels are running.
         for _ in 0..2 {

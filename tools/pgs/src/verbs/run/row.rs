@@ -70,7 +70,7 @@ impl Row {
         value["deepest_penetration_m"] = self.deepest.into();
         value["kinetic_energy_j"] = self.kinetic_energy.into();
         value["kinetic_energy_before_gravity_j"] = self.before_gravity.into();
-        value["host_on_a53_ms"] = self.a53.map(|host| host.to_json()).into();
+        value["host_on_a53_ms"] = self.a53.map(HostTimes::to_json).into();
         value["host_ms"]["detect"] = milliseconds(self.detect).into();
         value
     }
