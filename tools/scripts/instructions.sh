@@ -109,10 +109,10 @@ while read -r profile thing limit; do
 done <<'LIMITS'
 float as-given 275
 float in-order 268
-float warm 340
+float warm 286
 half as-given 376
 half in-order 394
-half warm 473
+half warm 418
 LIMITS
 
 # A step on the emulated board, on one thread; the vectors are those that valgrind knows, AVX2.
