@@ -28,7 +28,7 @@ const PARTS: [(&str, Of, [[f64; 2]; 2]); 8] = [
     ("bodies", Of::Body, [[119.0, 119.0], [130.0, 130.0]]),
     ("results", Of::Body, [[75.0, 75.0], [74.0, 74.0]]),
     ("commit", Of::Collision, [[0.0, 194.0], [0.0, 205.0]]),
-    ("driver", Of::Collision, [[7.4, 12.4], [1.0, 1.4]]),
+    ("driver", Of::Collision, [[16.4, 21.7], [9.5, 9.9]]),
 ];
 
 /// The place of the detection, which is no part of the driver.
