@@ -4,7 +4,7 @@
 # pauses on all streams, and resets in the middle. The programs are in bitstream-model/rtl/cocotb.
 #
 # usage: rtl-cocotb.sh [--scenes N] [--cycles N] [--seed N] [--full]
-#          --scenes   random steps for each form of inertia: 6, with --full 100
+#          --scenes   random steps for each form of inertia: 2, with --full 100
 #          --cycles   the longest step among them, without waits: 2200, with --full 6000
 #          --seed     of the random steps and of the pauses: 1
 #          --full     every part on both builds: faults in packets and all golden folders, too. Two million cycles:
@@ -31,7 +31,7 @@ while [ $# -gt 0 ]; do
 	declare "${1#--}=$2"
 	shift 2
 done
-scenes=${scenes:-${full:+100}} scenes=${scenes:-6}
+scenes=${scenes:-${full:+100}} scenes=${scenes:-2}
 cycles=${cycles:-${full:+6000}} cycles=${cycles:-2200}
 if [ -n "$full" ]; then need_packages libpython3-dev verilator g++ make; else need_packages libpython3-dev iverilog; fi
 
