@@ -1,6 +1,6 @@
 //! Friction along the two tangents of a collision, and as a vector in the world.
 //!
-//! The tangents of a unit normal n are those that the accelerator makes, the directions of
+//! The accelerator makes two tangents of a unit normal n. They are the directions of
 //! [`Impulses::friction`](crate::Impulses::friction). Where |n.z| is large:
 //!
 //! ```text

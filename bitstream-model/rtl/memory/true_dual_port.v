@@ -8,8 +8,8 @@
 // Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
-// ADDRESS_STAGES, so that accesses take effect in the order in which they are made. The first of the output
-// stages, of which there is at least one, lies in the blocks; the choice between the tiles follows it.
+// ADDRESS_STAGES, so that accesses take effect in the order in which they are made. OUTPUT_STAGES is at
+// least 1: the first output stage lies in the blocks, and the choice between the tiles follows it.
 `default_nettype none
 
 module true_dual_port #(

@@ -1,16 +1,17 @@
 // The issue queue of a pass (specification, section 8): the oldest collision that is free of hazards
 // goes. It decides in slots of two cycles, so that nothing depends on the time at which a beat comes.
 //
-// Collisions stand in places, the oldest in the lowest: the queue, and behind it a few places for the ones
-// that have left the finder and not entered. As one enters, all behind the one that issued move on by a place.
-// So the order of the places is the order of the stream, and a place holds no more than who uses which
-// bodies, from which slot on it is free, and where its record lies: records do not move.
+// Collisions stand in places, the oldest in the lowest: the queue, and behind it a few places for collisions
+// that have left the finder and not entered. When a collision enters, all collisions behind the one that
+// issued move on by a place. So the order of the places is the order of the stream. A place holds the bodies
+// of its collision, the slot from which on it is free, and the number of its record: records do not move.
 //
-//   phase 1    the first of the free places; who has a body in common with the oldest of all
-//   phase 0    it issues; who has a body in common with it is held for the window; one enters; the free places
+//   phase 1    find the first of the free places, and the places that share a body with the oldest collision
+//   phase 0    issue it, hold the places that share a body with it for the window, let a collision enter, and
+//              find the free places
 //
-// Both cycles of a slot have the same comparators: the bodies of the one that issues, or of the oldest one, with
-// those of all places.
+// Both cycles of a slot have the same comparators. They compare the bodies of all places with the bodies of
+// the collision that issues, or with the bodies of the oldest collision.
 `default_nettype none
 
 module queue #(
@@ -190,7 +191,7 @@ module queue #(
   wire [SLOTS-1:0] stays   = occupied & {{COMING{1'b1}}, ~pick};
   wire [SLOTS-1:0] frees   = moved(moves, stays & ~holds & ~blocked);
   wire [SLOTS-1:0] firsts  = moved(moves, {{(COMING-1){1'b0}}, first_of});
-  wire unused = &{1'b0, frees, firsts, from_first[DEPTH]};   // those of the places behind the queue
+  wire unused = &{1'b0, frees, firsts, from_first[DEPTH]};   // bits of the places behind the queue
   always @(posedge clk) begin
     {asked_slot, asked_a, asked_b, asked_moves_a, asked_moves_b} <= first_record;
     if (phase & ~will_decide) {asked_moves_a, asked_moves_b} <= 2'b00;

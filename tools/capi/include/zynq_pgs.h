@@ -407,7 +407,7 @@ enum zpgs_status zpgs_commit(struct zpgs_accelerator *accelerator,
                              const struct zpgs_collisions *collisions);
 
 // Forgets the last step of a world that `zpgs_commit` has kept, and frees its memory: all
-// collisions of the next step are then new. A world of which nothing is kept is no error.
+// collisions of the next step are then new. A world without a kept step is no error.
 // `zpgs_close` forgets every world.
 //
 // # Safety

@@ -305,7 +305,7 @@ pub unsafe extern "C" fn zpgs_commit(
 }
 
 /// Forgets the last step of a world that `zpgs_commit` has kept, and frees its memory: all
-/// collisions of the next step are then new. A world of which nothing is kept is no error.
+/// collisions of the next step are then new. A world without a kept step is no error.
 /// `zpgs_close` forgets every world.
 ///
 /// # Safety

@@ -15,11 +15,11 @@ const BYTES: [u64; 2] = [224, 128];
 /// The cores, which share a step evenly.
 const CORES: f64 = 4.0;
 
-/// The parts of a step, and what each takes on one core, ns a collision or a body: in a scene that
+/// The parts of a step, and the time of each on one core, ns a collision or a body: in a scene that
 /// the second-level cache holds and in a larger one, each cold and warm.
 ///
-/// `tools/scripts/a53-step.sh` counts them, prints them in its last table, and fails if one of them
-/// is off by more than a tenth.
+/// `tools/scripts/a53-step.sh` counts the times, prints them in its last table, and fails if a time
+/// is off by more than a tenth and by more than a hundredth of the step.
 const PARTS: [(&str, Of, [[f64; 2]; 2]); 8] = [
     ("detection", Of::Collision, [[936.0, 873.0], [870.0, 870.0]]),
     ("points", Of::Collision, [[0.0, 129.0], [0.0, 141.0]]),
@@ -77,7 +77,7 @@ impl HostTimes {
         Self(std::array::from_fn(|part| self.0[part] + other.0[part]))
     }
 
-    /// The mean of a step, for people, and what limits beside `board` ms.
+    /// The mean of a step, for people, and whether it or the board's `board` ms limit.
     pub(crate) fn text(self, steps: u32, board: f64) -> String {
         let [detection, driver @ ..] = self.0.map(|ms| ms / f64::from(steps.max(1)));
         let driver: f64 = driver.iter().sum();

@@ -46,7 +46,7 @@ pub(crate) struct Experiment {
     pub(crate) run: fn(&ArgMatches, &Session) -> Result<Part>,
 }
 
-/// Arguments that measure or compute what they ask for.
+/// The arguments of an experiment, which run it.
 pub(crate) trait Measure: Args {
     fn measure(&self, session: &Session) -> Result<Part>;
 }

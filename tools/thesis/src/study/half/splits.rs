@@ -1,4 +1,4 @@
-//! Measures what sixteen bits lose on the numbers of a step, by their form (thesis §4.6.4).
+//! Measures the loss of sixteen bits on the numbers of a step, by their form (thesis §4.6.4).
 
 use crate::formats::{Loss, Sizes};
 use crate::narrow::NarrowFormat;
