@@ -58,8 +58,8 @@ fn new_vanished_and_reordered_collisions_and_points_have_their_own_impulses() {
     let (_, mut old) = scene(5);
     old.iter_mut().for_each(|collision| collision.count = 4);
     let last = last(&old[..4]);
-    // Number 1 has vanished. Two collisions share the points of number 2. The second of them has a
-    // new point, and a point beyond its count.
+    // Number 1 has vanished. Two collisions share the points of number 2. Both have new points, and
+    // the second one has a point beyond its count.
     let new = [old[3], old[9], old[0], old[2], Collision { count: 3, ..old[2] }];
     let [moved, rest] = [[3, 255, 0, 255], [255, 1, 255, 2]];
     let [moved, rest] = [moved, rest].map(|points| Place { collision: 2, points });
