@@ -67,7 +67,7 @@ module pgs_top (
   wire unused = &{1'b0, s_axi_awprot, s_axi_arprot, bodies[31:20], collisions[31:20],
                   contact_iterations[31:8], friction_iterations[31:8], flags[31:7]};
 
-  control_block control (
+  pgs_control_block control (
     .clk(aclk), .resetn(aresetn),
     .awaddr(s_axi_awaddr), .awvalid(s_axi_awvalid), .awready(s_axi_awready),
     .wdata(s_axi_wdata), .wstrb(s_axi_wstrb), .wvalid(s_axi_wvalid), .wready(s_axi_wready),
@@ -86,7 +86,7 @@ module pgs_top (
     .hazards(hazards), .sum_received(sum_received), .sum_sent(sum_sent), .impulse_total(impulse_total)
   );
 
-  core accelerator (
+  pgs_core accelerator (
     .clk(aclk), .reset(core_reset), .start(start), .clear(core_clear),
     .bodies(bodies[19:0]), .collisions(collisions[19:0]),
     .contact_iterations(contact_iterations[7:0]), .friction_iterations(friction_iterations[7:0]),

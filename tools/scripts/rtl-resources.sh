@@ -55,22 +55,22 @@ table() {
 	attend python3 tools/scripts/rtl_memories.py --brams "$2" "$work/$1/memories.json"
 	echo
 	attend python3 tools/scripts/rtl_resources.py --brams "$2" \
-		"$work/$1/pgs_top.json" "$work"/base/{contact,friction,integration}.json
+		"$work/$1/pgs_top.json" "$work"/base/pgs_{contact,friction,integration}.json
 }
 
 # Prints what the rule of the smallest normal number takes in each operator that has it, and in all of them.
 rule() {
 	local operator
-	for operator in fmul fdiv; do
+	for operator in pgs_fmul pgs_fdiv; do
 		synthesise base "$operator"
 		parameters='-set SMALLEST_NORMAL 0' synthesise without "$operator"
 	done
 	attend python3 tools/scripts/rtl_resources.py --rule "$work/base" "$work/without" \
-		"$work"/base/{pgs_top,contact,friction,integration}.json
+		"$work"/base/pgs_{top,contact,friction,integration}.json
 }
 
 parameters=
-pipelines=(contact friction integration)
+pipelines=(pgs_contact pgs_friction pgs_integration)
 generate base "$@"
 synthesise base pgs_top "${pipelines[@]}"
 for pipeline in "${pipelines[@]}"; do synthesise base "$pipeline"; done

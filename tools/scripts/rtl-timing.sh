@@ -31,7 +31,7 @@ litter+=("$work")
 attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" --bodies 1024 --collisions 1024 >/dev/null
 cp -r "$work" "$work.control"
 litter+=("$work.control")
-for module in contact friction integration fmul fdiv; do
+for module in pgs_contact pgs_friction pgs_integration pgs_fmul pgs_fdiv; do
 	python3 "$scripts/rtl_timing_wrap.py" stub "$work/$module.v" "$module" > "$work.control/$module.v"
 done
 
@@ -65,7 +65,7 @@ for module in "${modules[@]}"; do
 		top=pgs_top
 		route "$work.control" "$top"
 	else
-		top=$module
+		top=pgs_$module
 		route "$work" "$top"
 	fi
 	printf '%-10s %8.1f MHz\n' "$module" "$mhz"

@@ -41,7 +41,7 @@ def memories(modules, name, path, found):
     for cell, what in module["cells"].items():
         if what["type"] in modules:
             # An instance's place is the nearest name that is not one of many alike.
-            plain = not cell.startswith("g_") and what["type"].split("\\")[-1] not in ("ram_lane", "ram_tile")
+            plain = not cell.startswith("g_") and what["type"].split("\\")[-1] not in ("pgs_ram_lane", "pgs_ram_tile")
             memories(modules, what["type"], cell if plain and "." not in cell else path, found)
 
 

@@ -65,8 +65,8 @@ def modules_of(path):
 
 
 def plain(name):
-    """The name of a module as the Verilog has it, without its parameters."""
-    return name.split("\\")[1] if "\\" in name else name
+    """The name of a module as the Verilog has it, without its parameters and the prefix of all modules."""
+    return (name.split("\\")[1] if "\\" in name else name).removeprefix("pgs_")
 
 
 def cost(cell):
@@ -131,7 +131,7 @@ def print_rule(folders, modules):
         taken = []
         for folder in folders:
             parts = {}
-            add_up(modules_of(f"{folder}/{operator}.json"), "\\" + operator, operator, parts)
+            add_up(modules_of(f"{folder}/pgs_{operator}.json"), "\\pgs_" + operator, operator, parts)
             taken.append(parts[operator])
         units = instances(modules, "\\pgs_top", operator)
         more = [taken[0][i] - taken[1][i] for i in (LUT, FF)]

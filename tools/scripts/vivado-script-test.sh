@@ -133,7 +133,7 @@ script=zcu102.tcl
 	plant "a port without its clock" $script 's/PSU__USE__M_AXI_GP1 0/PSU__USE__M_AXI_GP1 1/' \
 		"processor/maxihpm1_fpd_aclk hangs"
 	plant "a module that is missing" $script 's/foreach module $modules/foreach module [lrange $modules 1 end]/' \
-		"uses fadd, which is not in the project"
+		"uses pgs_fadd, which is not in the project"
 	plant "a header that is missing" $script 's/-directory $rtl \*.vh/-directory $rtl pgs_o*.vh/' \
 		"which is not in the project"
 	plant "a design that is not validated" $script '/^\tvalidate_bd_design/d' "before it is valid"

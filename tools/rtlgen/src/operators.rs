@@ -8,7 +8,7 @@ use crate::graph::Operation;
 /// An operator of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Operator {
-    /// Name of the Verilog module.
+    /// Name of the Verilog module, without the prefix `pgs_` of all modules.
     pub module: &'static str,
     /// Names of the module's operand ports, in the order of a node's operands.
     pub ports: &'static [&'static str],

@@ -12,9 +12,9 @@ pub struct Source<'a> {
 macro_rules! sources {
     ($($folder:literal: $($name:literal),+;)*) => {
         &[$($(Source {
-            file: concat!($name, ".v"),
+            file: concat!("pgs_", $name, ".v"),
             text: include_str!(concat!(
-                env!("CARGO_MANIFEST_DIR"), "/../../bitstream-model/rtl/", $folder, $name, ".v"
+                env!("CARGO_MANIFEST_DIR"), "/../../bitstream-model/rtl/", $folder, "pgs_", $name, ".v"
             )),
         }),+),*]
     };
@@ -35,7 +35,7 @@ pub const AROUND: &[Source<'_>] = sources! {
     "operators/": "half_to_float";
     "pass/": "finder", "issue", "queue_records", "queue_hazard", "queue_first", "queue",
         "issue_numbers", "impulses", "impulse_sum";
-    "": "core", "control_block", "pgs_top";
+    "": "core", "control_block", "top";
 };
 
 #[cfg(test)]

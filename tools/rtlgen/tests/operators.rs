@@ -42,58 +42,58 @@ const FAULTS: [Fault; 11] = [
     // A sticky bit is lost.
     Fault {
         operator: "add",
-        file: "fadd.v",
+        file: "pgs_fadd.v",
         correct: "lost_in_2s | lost_in_1;",
         wrong: "lost_in_2s | (lost_in_1 & shifted[1]);",
     },
     // The grid of the subnormal numbers is forgotten.
-    Fault { operator: "mul", file: "fmul.v", correct: "(&fraction)", wrong: "1'b0" },
-    Fault { operator: "div", file: "fdiv.v", correct: "(&fraction)", wrong: "1'b0" },
+    Fault { operator: "mul", file: "pgs_fmul.v", correct: "(&fraction)", wrong: "1'b0" },
+    Fault { operator: "div", file: "pgs_fdiv.v", correct: "(&fraction)", wrong: "1'b0" },
     // The root is cut off.
     Fault {
         operator: "sqrt",
-        file: "fsqrt.v",
+        file: "pgs_fsqrt.v",
         correct: "{30'd0, root_s26[0]}",
         wrong: "{30'd0, root_s26[0] & zero_s26}",
     },
     // A delay is one stage short.
     Fault {
         operator: "sincos",
-        file: "fsincos.v",
+        file: "pgs_fsincos.v",
         correct: "zs[46*6 +: 46]",
         wrong: "zs[46*5 +: 46]",
     },
     // NaN gives the first operand.
     Fault {
         operator: "max",
-        file: "fmax.v",
+        file: "pgs_fmax.v",
         correct: "y <= a_above_b ?",
         wrong: "y <= (a_above_b | (&b[30:22])) ?",
     },
     // A subnormal operand becomes the result.
     Fault {
         operator: "min",
-        file: "fmin.v",
+        file: "pgs_fmin.v",
         correct: "b[22:0] & {23{|b[30:23]}}",
         wrong: "b[22:0]",
     },
     // A number is less than itself.
     Fault {
         operator: "less",
-        file: "fless.v",
+        file: "pgs_fless.v",
         correct: "y <= a_below_b",
         wrong: "y <= a_below_b | (a == b)",
     },
     // One register more.
     Fault {
         operator: "select",
-        file: "fselect.v",
+        file: "pgs_fselect.v",
         correct: "always @(posedge clk) begin\n    y <= condition ? a : b;",
         wrong: "reg [31:0] late;\n\n  always @(posedge clk) begin\n    late <= condition ? a : b;\n\
                 y <= late;",
     },
-    Fault { operator: "nonzero", file: "fnonzero.v", correct: "<= flag &", wrong: "<= flag |" },
-    Fault { operator: "or", file: "flogic_or.v", correct: "a | b", wrong: "a ^ b" },
+    Fault { operator: "nonzero", file: "pgs_fnonzero.v", correct: "<= flag &", wrong: "<= flag |" },
+    Fault { operator: "or", file: "pgs_flogic_or.v", correct: "a | b", wrong: "a ^ b" },
 ];
 
 #[test]

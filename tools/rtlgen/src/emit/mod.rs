@@ -37,7 +37,7 @@ pub fn files(design: &Design) -> Vec<File> {
     }
     for pipeline in design.pipelines() {
         let text = pipeline::pipeline(pipeline, design.parameters.smallest_normal);
-        modules.push(file(&format!("{}.v", pipeline.name), text));
+        modules.push(file(&format!("pgs_{}.v", pipeline.name), text));
     }
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
     files.append(&mut modules);

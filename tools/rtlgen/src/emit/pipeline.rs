@@ -140,7 +140,7 @@ impl Emitter<'_> {
             schedule.impulses_at
         );
         line!(text, "`default_nettype none\n");
-        line!(text, "module {name} (\n  input wire clk,");
+        line!(text, "module pgs_{name} (\n  input wire clk,");
         if schedule.interval > 1 {
             line!(text, "  input wire [{}:0] phase,", schedule.interval - 1);
         }
@@ -265,7 +265,7 @@ impl Emitter<'_> {
                 line!(text, "  wire {}{target};", range(width));
                 line!(
                     text,
-                    "  delay #(.WIDTH({width}), .SLOTS({})) delay_{target} (.clk(clk), \
+                    "  pgs_delay #(.WIDTH({width}), .SLOTS({})) delay_{target} (.clk(clk), \
                      .enable({enable}), .d({source}), .q({target}));",
                     tap - from,
                 );
@@ -306,7 +306,7 @@ impl Emitter<'_> {
         };
         line!(
             text,
-            "  {} {parameters}{name} ({}, .y({name}_y));",
+            "  pgs_{} {parameters}{name} ({}, .y({name}_y));",
             operator.module,
             ports.join(", ")
         );

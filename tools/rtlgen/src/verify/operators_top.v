@@ -17,22 +17,22 @@ module operators_top (
 
   assign results[383:352] = {28'd0, flags};
 
-  fadd add (.clk(clk), .a(a), .b(b), .y(results[31:0]));
-  fmul mul (.clk(clk), .a(a), .b(b), .y(results[63:32]));
-  fdiv div (.clk(clk), .a(a), .b(b), .y(results[95:64]));
-  fsqrt sqrt (.clk(clk), .a(radicand), .y(results[127:96]));
-  fsincos sincos (.clk(clk), .a(argument), .y(results[191:128]));
-  fmax max (.clk(clk), .a(a), .b(b), .y(results[223:192]));
-  fmin min (.clk(clk), .a(a), .b(b), .y(results[255:224]));
-  fselect select (.clk(clk), .condition(argument[0]), .a(a), .b(b), .y(results[287:256]));
-  fmul #(.SMALLEST_NORMAL(0)) mul_0 (.clk(clk), .a(a), .b(b), .y(results[319:288]));
-  fdiv #(.SMALLEST_NORMAL(0)) div_0 (.clk(clk), .a(a), .b(b), .y(results[351:320]));
-  fless less (.clk(clk), .a(a), .b(b), .y(flags[0]));
-  fnonzero nonzero (.clk(clk), .flag(argument[0]), .a(a), .y(flags[1]));
-  flogic_or logic_or (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[2]));
-  flogic_and logic_and (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[3]));
-  fmax_or max_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[415:384]));
-  fmin_or min_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[447:416]));
+  pgs_fadd add (.clk(clk), .a(a), .b(b), .y(results[31:0]));
+  pgs_fmul mul (.clk(clk), .a(a), .b(b), .y(results[63:32]));
+  pgs_fdiv div (.clk(clk), .a(a), .b(b), .y(results[95:64]));
+  pgs_fsqrt sqrt (.clk(clk), .a(radicand), .y(results[127:96]));
+  pgs_fsincos sincos (.clk(clk), .a(argument), .y(results[191:128]));
+  pgs_fmax max (.clk(clk), .a(a), .b(b), .y(results[223:192]));
+  pgs_fmin min (.clk(clk), .a(a), .b(b), .y(results[255:224]));
+  pgs_fselect select (.clk(clk), .condition(argument[0]), .a(a), .b(b), .y(results[287:256]));
+  pgs_fmul #(.SMALLEST_NORMAL(0)) mul_0 (.clk(clk), .a(a), .b(b), .y(results[319:288]));
+  pgs_fdiv #(.SMALLEST_NORMAL(0)) div_0 (.clk(clk), .a(a), .b(b), .y(results[351:320]));
+  pgs_fless less (.clk(clk), .a(a), .b(b), .y(flags[0]));
+  pgs_fnonzero nonzero (.clk(clk), .flag(argument[0]), .a(a), .y(flags[1]));
+  pgs_flogic_or logic_or (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[2]));
+  pgs_flogic_and logic_and (.clk(clk), .a(argument[0]), .b(argument[1]), .y(flags[3]));
+  pgs_fmax_or max_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[415:384]));
+  pgs_fmin_or min_or (.clk(clk), .condition(argument[0]), .a(a), .b(b), .c(radicand), .y(results[447:416]));
 
 endmodule
 

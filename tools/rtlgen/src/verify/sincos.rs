@@ -168,7 +168,7 @@ mod tests {
     /// The Verilog has the same coefficients.
     #[test]
     fn the_verilogs_coefficients_are_these() {
-        let source = crate::sources::OPERATORS.iter().find(|source| source.file == "fsincos.v");
+        let source = crate::sources::OPERATORS.iter().find(|source| source.file == "pgs_fsincos.v");
         let text = source.map_or("", |source| source.text);
         for (letter, coefficients) in [('S', SINE), ('C', COSINE)] {
             for (index, coefficient) in (1..).zip(coefficients) {
