@@ -221,8 +221,8 @@ pub const MUTATIONS: &[Mutation] = &[
         name: "the patience of the queue ends a slot late",
         inertia: Inertia::Isotropic,
         file: "pgs_queue.v",
-        right: "PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW;",
-        wrong: "PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW + 1;",
+        right: "PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW[10:0];",
+        wrong: "PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW[10:0] + 11'd1;",
     },
     Mutation {
         name: "a collision that waits in the queue is free a slot early",
@@ -298,8 +298,8 @@ pub const MUTATIONS: &[Mutation] = &[
         name: "one body with world inertia has the beats of an isotropic one",
         inertia: Inertia::World,
         file: "pgs_receiver.v",
-        right: "& (of == VELOCITIES)) ? one_body\n",
-        wrong: "& (of == VELOCITIES)) ? body_beats_one\n",
+        right: "(of == VELOCITIES) ? velocities_one :",
+        wrong: "(of == VELOCITIES) ? poses_one :",
     },
     Mutation {
         name: "the load with world inertia does not wait for the last row",

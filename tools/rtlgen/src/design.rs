@@ -1,7 +1,7 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::{Depth, FLOAT, Inertia, Variant};
+use pgs_interface::profile::{Depth, FLOAT, HALF, Inertia, Profile, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use crate::equations;
@@ -11,6 +11,8 @@ use crate::schedule::Schedule;
 /// The choices of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parameters {
+    /// The profile that the build is of.
+    pub profile: &'static Profile,
     /// Bodies that the memories hold.
     pub bodies: u32,
     /// Collisions that the memories hold.
@@ -41,30 +43,37 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self::with(Inertia::Isotropic)
+        Self::of(&FLOAT, Inertia::Isotropic)
     }
 }
 
 impl Parameters {
-    /// The default choices with that form of inertia. World inertia takes more than twice the
-    /// memory a body.
+    /// The default choices of `float` with that form of inertia.
     #[must_use]
     pub fn with(inertia: Inertia) -> Self {
+        Self::of(&FLOAT, inertia)
+    }
+
+    /// The default choices of a profile with that form of inertia. World inertia takes more than
+    /// twice the memory a body.
+    #[must_use]
+    pub fn of(profile: &'static Profile, inertia: Inertia) -> Self {
         let (bodies, collisions) = match inertia {
             Inertia::Isotropic => (40_960, 131_072),
             Inertia::World => (16_384, 65_536),
         };
         Self {
+            profile,
             bodies,
             collisions,
             inertia,
             interlocked: true,
-            queue: FLOAT.queue.unwrap_or(0),
+            queue: profile.queue.unwrap_or(0),
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
             memory: Fence::default(),
-            clock_khz: FLOAT.clock_khz,
+            clock_khz: profile.clock_khz,
         }
     }
 }
@@ -75,16 +84,18 @@ pub enum BuildError {
     /// A collision would take the velocities of the one before it.
     #[error(
         "{address_stages} registers in front of the memories and {output_stages} behind them give \
-         a read latency of {latency} cycles, expected an even number: a port reads in one cycle of \
-         a slot and writes in the other; add a register on either side"
+         a read latency of {latency} cycles, expected a multiple of {interval}: a port reads in \
+         one cycle of a slot and writes in the others; add registers on either side"
     )]
-    OddReadLatency {
+    ReadLatency {
         /// Registers in front of the memories.
         address_stages: u32,
         /// Registers behind them.
         output_stages: u32,
         /// Cycles from an address to the word.
         latency: u32,
+        /// Cycles of a slot.
+        interval: u32,
     },
     /// A queue waits for hazards to be over, and an unchecked build does not know of them.
     #[error(
@@ -95,13 +106,33 @@ pub enum BuildError {
         /// The requested depth.
         queue: u32,
     },
+    /// Collisions leave a queue one by one.
+    #[error("an issue queue of {queue} collisions in profile {profile}, expected none")]
+    NoQueue {
+        /// The requested depth.
+        queue: u32,
+        /// The name of the profile.
+        profile: &'static str,
+    },
+    /// The profile has no pipelines yet.
+    #[error("profile {profile} has no pipelines")]
+    NoPipelines {
+        /// The name of the profile.
+        profile: &'static str,
+    },
+    /// The profile is not built with that form of inertia.
+    #[error("profile {profile} with world inertia, expected isotropic inertia")]
+    NoInertia {
+        /// The name of the profile.
+        profile: &'static str,
+    },
 }
 
 impl Parameters {
     /// The variant of the profile that the build is.
     #[must_use]
     pub fn variant(&self) -> Variant {
-        Variant { inertia: self.inertia, ..FLOAT.default_variant() }
+        Variant { inertia: self.inertia, ..self.profile.default_variant() }
     }
 
     /// Refuses parameters that contradict the hand-written modules.
@@ -111,9 +142,21 @@ impl Parameters {
     /// Every [`BuildError`].
     pub fn check(&self) -> Result<(), BuildError> {
         let latency = self.read_latency();
-        let Self { address_stages, output_stages, queue, .. } = *self;
-        if !latency.is_multiple_of(FLOAT.initiation_interval) {
-            return Err(BuildError::OddReadLatency { address_stages, output_stages, latency });
+        let Self { profile, address_stages, output_stages, queue, .. } = *self;
+        let interval = profile.initiation_interval;
+        if !latency.is_multiple_of(interval) {
+            let wrong =
+                BuildError::ReadLatency { address_stages, output_stages, latency, interval };
+            return Err(wrong);
+        }
+        if profile.id == HALF.id {
+            return Err(BuildError::NoPipelines { profile: profile.name });
+        }
+        if !profile.inertias().contains(&self.inertia) {
+            return Err(BuildError::NoInertia { profile: profile.name });
+        }
+        if queue > 0 && !profile.has_queue() {
+            return Err(BuildError::NoQueue { queue, profile: profile.name });
         }
         if queue > 0 && !self.interlocked {
             return Err(BuildError::UncheckedQueue { queue });
@@ -173,7 +216,7 @@ impl Design {
     /// Schedules the three pipelines.
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
-        let interval = FLOAT.initiation_interval;
+        let interval = parameters.profile.initiation_interval;
         let contact = equations::contact(CONTACT_POINTS, parameters.inertia);
         let friction = equations::friction(parameters.inertia);
         Self {
@@ -218,7 +261,7 @@ impl Design {
     #[must_use]
     pub fn window_slots(&self) -> u32 {
         let windows = [&self.contact, &self.friction].map(|pass| self.depth(pass).window);
-        windows[0].max(windows[1]).div_ceil(FLOAT.initiation_interval)
+        windows[0].max(windows[1]).div_ceil(self.parameters.profile.initiation_interval)
     }
 
     /// Cycles that every step takes beside load, passes and one cycle a body: the way of the last

@@ -32,7 +32,7 @@ pub fn files(design: &Design) -> Vec<File> {
         file("pgs_schedule.vh", headers::schedule(design)),
     ];
     let mut modules = Vec::new();
-    for source in sources::OPERATORS.iter().chain(sources::AROUND) {
+    for source in sources::of(design.parameters.profile) {
         modules.push(file(source.file, source.text.into()));
     }
     for pipeline in design.pipelines() {
