@@ -62,14 +62,14 @@ module pgs_half_impulses #(
   wire        unused = &{1'b0, unused_words};
   pgs_true_dual_port #(
     .WIDTH(48), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
-    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES - 1)
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES - 1), .READS_A(0)
   ) low_words (
     .clk(clk), .write_a(write_low), .address_a(write_address), .in_a(low_in), .out_a(unused_words[47:0]),
     .write_b(1'b0), .address_b(next_read), .in_b(48'd0), .out_b(low)
   );
   pgs_true_dual_port #(
     .WIDTH(16), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
-    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES - 1)
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES - 1), .READS_A(0)
   ) high_words (
     .clk(clk), .write_a(write_high), .address_a(write_address), .in_a(high_in), .out_a(unused_words[63:48]),
     .write_b(1'b0), .address_b(next_read), .in_b(16'd0), .out_b(high)
