@@ -1,5 +1,7 @@
 //! The Verilog of the repository, as part of the program.
 
+use pgs_interface::number::Precision;
+
 /// A file of Verilog.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
@@ -20,11 +22,31 @@ macro_rules! sources {
     };
 }
 
-/// The operators, each after the modules that it is made of.
-pub const OPERATORS: &[Source<'_>] = sources! {
-    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
-        "fmax_or", "fmin_or", "fless", "fselect", "fnonzero", "flogic_or", "flogic_and";
+/// The arithmetic operators of binary32, each after the modules that it is made of.
+const SINGLE: &[Source<'_>] = sources! {
+    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos";
 };
+
+/// The ones of binary16, and the conversion to it.
+const HALF: &[Source<'_>] = sources! {
+    "operators/": "hnormal", "hround", "hadd", "hmul", "hdiv", "hsqrt", "hsincos", "float_to_half";
+};
+
+/// Comparisons and selections, which have the width as a parameter.
+const OF_BOTH: &[Source<'_>] = sources! {
+    "operators/": "fbelow", "fmax", "fmin", "fmax_or", "fmin_or", "fless", "fselect", "fnonzero",
+        "flogic_or", "flogic_and";
+};
+
+/// The operators of a precision.
+#[must_use]
+pub fn operators(precision: Precision) -> Vec<Source<'static>> {
+    let arithmetic = match precision {
+        Precision::F32 => SINGLE,
+        Precision::Binary16 => HALF,
+    };
+    [arithmetic, OF_BOTH].concat()
+}
 
 /// All other hand-written modules, each after the modules that it is made of.
 pub const AROUND: &[Source<'_>] = sources! {
@@ -57,12 +79,16 @@ mod tests {
         Ok(())
     }
 
+    fn all() -> impl Iterator<Item = &'static Source<'static>> {
+        [SINGLE, HALF, OF_BOTH, AROUND].into_iter().flatten()
+    }
+
     #[test]
     fn the_lists_have_every_file_of_the_folder() -> io::Result<()> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bitstream-model/rtl");
         let mut files = Vec::new();
         verilog_below(&folder, &mut files)?;
-        let mut listed: Vec<_> = OPERATORS.iter().chain(AROUND).map(|source| source.file).collect();
+        let mut listed: Vec<_> = all().map(|source| source.file).collect();
         files.sort();
         listed.sort_unstable();
         assert_eq!(files, listed);
@@ -71,7 +97,7 @@ mod tests {
 
     #[test]
     fn every_file_holds_the_module_of_its_name() {
-        for Source { file, text } in OPERATORS.iter().chain(AROUND) {
+        for Source { file, text } in all() {
             let module = format!("\nmodule {} ", file.trim_end_matches(".v"));
             assert_eq!(text.matches("\nmodule ").count(), 1, "{file}");
             assert!(text.contains(&module), "{file}");

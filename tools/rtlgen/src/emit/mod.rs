@@ -6,6 +6,8 @@ mod pipeline;
 mod text;
 mod vivado;
 
+use pgs_interface::number::Precision;
+
 use crate::design::Design;
 use crate::sources;
 
@@ -32,7 +34,7 @@ pub fn files(design: &Design) -> Vec<File> {
         file("pgs_schedule.vh", headers::schedule(design)),
     ];
     let mut modules = Vec::new();
-    for source in sources::OPERATORS.iter().chain(sources::AROUND) {
+    for source in sources::operators(Precision::F32).iter().chain(sources::AROUND) {
         modules.push(file(source.file, source.text.into()));
     }
     for pipeline in design.pipelines() {
