@@ -183,13 +183,14 @@ impl Design {
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let interval = FLOAT.initiation_interval;
-        let contact = equations::contact(CONTACT_POINTS, parameters.inertia);
-        let friction = equations::friction(parameters.inertia);
+        let precision = FLOAT.numbers.updates;
+        let contact = equations::contact(precision, CONTACT_POINTS, parameters.inertia);
+        let friction = equations::friction(precision, parameters.inertia);
         Self {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
             friction: Pipeline::new("friction", friction, interval),
-            integration: Pipeline::new("integration", equations::integration(), 1),
+            integration: Pipeline::new("integration", equations::integration(precision), 1),
         }
     }
 
@@ -253,6 +254,7 @@ fn unsigned(cycle: i32) -> u32 {
 mod tests {
     use super::*;
     use crate::graph::{Kind, Operation, Source};
+    use pgs_interface::number::Precision;
 
     const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
@@ -334,7 +336,7 @@ mod tests {
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
         // The slowest one: the second quotient, with registers before and behind the divider.
-        let ready = Operation::Divide.operator().latency + 4;
+        let ready = Operation::Divide.operator(Precision::F32).latency + 4;
         // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];

@@ -5,6 +5,8 @@
 //! their operands takes less than a second unit. The schedules stay as they are: no cycle and no
 //! window depends on the pool.
 
+use pgs_interface::number::Precision;
+
 use crate::design::Pipeline;
 use crate::graph::{NodeId, Operation};
 
@@ -31,10 +33,10 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Its name in the Verilog.
+    /// Its name in the Verilog, in numbers of a precision.
     #[must_use]
-    pub fn name(&self) -> String {
-        format!("{}_{}", self.operation.operator().module, self.number)
+    pub fn name(&self, precision: Precision) -> String {
+        format!("{}_{}", self.operation.operator(precision).module, self.number)
     }
 
     /// The operations of a pipeline.
@@ -52,11 +54,11 @@ const CHOICES: usize = 4;
 #[must_use]
 pub fn units(pipelines: &[&Pipeline]) -> Vec<Unit> {
     let mut pool: Vec<Unit> = Vec::new();
-    for (pipeline, Pipeline { schedule, .. }) in pipelines.iter().enumerate() {
+    for (pipeline, Pipeline { graph, schedule, .. }) in pipelines.iter().enumerate() {
         let own = |unit: &Unit| unit.of(pipeline).next().is_some();
         for scheduled in &schedule.units {
             let operation = scheduled.operation;
-            let shares = operation.operator().arithmetic;
+            let shares = operation.operator(graph.precision()).arithmetic;
             let uses = scheduled.phases.iter().enumerate();
             let uses: Vec<Use> = uses
                 .filter_map(|(phase, node)| node.map(|node| Use { pipeline, phase, node }))
@@ -96,7 +98,7 @@ mod tests {
                     let Pipeline { graph, schedule, .. } = pipelines[pipeline];
                     assert_eq!(graph.node(node).kind.operation(), Some(unit.operation));
                     assert_eq!(schedule.phase(schedule.starts[node.index()]), phase);
-                    assert!(!taken.contains(&(pipeline, phase)), "{}", unit.name());
+                    assert!(!taken.contains(&(pipeline, phase)), "{unit:?}");
                     taken.push((pipeline, phase));
                     carried_out.push((pipeline, node));
                 }
