@@ -7,8 +7,6 @@ mod solver;
 mod text;
 mod vivado;
 
-use pgs_interface::number::Precision;
-
 use crate::design::Design;
 use crate::sources;
 
@@ -31,11 +29,11 @@ pub fn files(design: &Design) -> Vec<File> {
     let file = |name: &str, text: String| File { name: name.into(), text };
     let mut files = vec![
         file("pgs_interface.vh", headers::interface()),
-        file("pgs_operators.vh", headers::operators(Precision::F32)),
+        file("pgs_operators.vh", headers::operators(design.parameters.profile.numbers.updates)),
         file("pgs_schedule.vh", headers::schedule(design)),
     ];
     let mut modules = Vec::new();
-    for source in sources::operators(Precision::F32).iter().chain(sources::AROUND) {
+    for source in sources::of(design.parameters.profile) {
         modules.push(file(source.file, source.text.into()));
     }
     for module in design.modules() {
@@ -54,6 +52,7 @@ mod tests {
     use super::*;
     use crate::design::Parameters;
     use crate::pool::{self, Unit};
+    use pgs_interface::number::Precision;
 
     /// Instances that leave the rule of the smallest normal number out, in the whole design.
     fn without_rule(smallest_normal: bool) -> usize {
