@@ -40,6 +40,7 @@ folder=$(mktemp -d)
 litter+=("$folder")
 if [ "$mode" = '' ]; then
 	attend "$built/rtlgen" operators --vectors "${VECTORS:-1000000}"
+	attend "$built/rtlgen" operators --numbers binary16 --vectors "${VECTORS:-1000000}"
 	attend "$built/rtlgen" sincos --all
 	attend "$built/rtlgen" schedule
 	attend "$built/rtlgen" schedule --inertia world

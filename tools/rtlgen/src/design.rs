@@ -114,12 +114,6 @@ pub enum BuildError {
         /// The name of the profile.
         profile: &'static str,
     },
-    /// The profile has no pipelines yet.
-    #[error("profile {profile} has no pipelines")]
-    NoPipelines {
-        /// The name of the profile.
-        profile: &'static str,
-    },
     /// The profile is not built with that form of inertia.
     #[error("profile {profile} with world inertia, expected isotropic inertia")]
     NoInertia {
@@ -148,9 +142,6 @@ impl Parameters {
             let wrong =
                 BuildError::ReadLatency { address_stages, output_stages, latency, interval };
             return Err(wrong);
-        }
-        if profile.id == HALF.id {
-            return Err(BuildError::NoPipelines { profile: profile.name });
         }
         if !profile.inertias().contains(&self.inertia) {
             return Err(BuildError::NoInertia { profile: profile.name });
@@ -198,41 +189,61 @@ pub struct Module<'a> {
     pub pipelines: Vec<&'a Pipeline>,
 }
 
-/// A build of profile `float`.
+/// A build of a profile.
 #[derive(Debug)]
 pub struct Design {
     /// The choices.
     pub parameters: Parameters,
-    /// Contact passes, a collision every initiation interval of the profile.
+    /// Contact passes, a collision every initiation interval of the profile. Where two collisions
+    /// issue together, each has a pipeline of its own.
     pub contact: Pipeline,
     /// Friction passes, likewise.
     pub friction: Pipeline,
-    /// Integration, a body a cycle: as fast as the streams take results.
+    /// Integration, as fast as the streams take results: in `float` a body a cycle, in `half` five
+    /// bodies in four cycles, for which there are five pipelines.
     pub integration: Pipeline,
 }
 
-/// Cycles between the issue of a collision and cycle 0 of its pipeline, and between the results and
-/// the first issue that sees them: record registers, write registers.
-const AROUND_A_PASS: u32 = 8;
+/// Cycles of the control around the pipelines.
+struct Around {
+    /// Between the issue of a collision and cycle 0 of its pipeline, and between the results and
+    /// the first issue that sees them: record registers, write registers.
+    pass: u32,
+    /// Of a step in which nothing is loaded, passed or integrated, beside the way of the last body
+    /// through the integration.
+    step: u32,
+    /// From a body to the next in one pipeline of the integration.
+    interval: u32,
+}
 
-/// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last
-/// body through the integration: set-up in front of the first pass (10), the end of the load (2),
-/// the entry into the integration (1), the result FIFOs and their end (5), the sums and the end
-/// (3).
-const AROUND_A_STEP: u32 = 21;
+/// Around a step: set-up in front of the first pass (10), the end of the load (2), the entry into
+/// the integration (1), the result FIFOs and their end (5), the sums and the end (3).
+const AROUND_FLOAT: Around = Around { pass: 8, step: 21, interval: 1 };
+const AROUND_HALF: Around = Around { pass: 9, step: 32, interval: 4 };
+
+impl Parameters {
+    fn around(&self) -> &'static Around {
+        if self.profile.id == HALF.id { &AROUND_HALF } else { &AROUND_FLOAT }
+    }
+}
 
 impl Design {
     /// Schedules the three pipelines.
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let interval = parameters.profile.initiation_interval;
-        let contact = equations::contact(CONTACT_POINTS, parameters.inertia);
-        let friction = equations::friction(parameters.inertia);
+        let precision = parameters.profile.numbers.updates;
+        let contact = equations::contact(precision, CONTACT_POINTS, parameters.inertia);
+        let friction = equations::friction(precision, parameters.inertia);
         Self {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
             friction: Pipeline::new("friction", friction, interval),
-            integration: Pipeline::new("integration", equations::integration(), 1),
+            integration: Pipeline::new(
+                "integration",
+                equations::integration(precision),
+                parameters.around().interval,
+            ),
         }
     }
 
@@ -242,10 +253,18 @@ impl Design {
         [&self.contact, &self.friction, &self.integration]
     }
 
-    /// The modules that the pipelines are.
+    /// The modules that the pipelines are: one, unless the passes and the integration differ in
+    /// the number of their pipelines.
     #[must_use]
     pub fn modules(&self) -> Vec<Module<'_>> {
-        vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }]
+        let [passes @ .., integration] = self.pipelines();
+        if integration.schedule.interval == 1 {
+            return vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }];
+        }
+        vec![
+            Module { name: "solver", pipelines: passes.to_vec() },
+            Module { name: "integration", pipelines: vec![integration] },
+        ]
     }
 
     /// Fill and hazard window of a pipeline, if it is one of the passes.
@@ -264,7 +283,7 @@ impl Design {
         let schedule = &pass.schedule;
         let after_velocities = unsigned(schedule.depth - schedule.velocities_at);
         Depth {
-            fill: unsigned(schedule.depth) + AROUND_A_PASS,
+            fill: unsigned(schedule.depth) + self.parameters.around().pass,
             window: after_velocities + self.parameters.read_latency() + unsigned(schedule.interval),
         }
     }
@@ -283,7 +302,9 @@ impl Design {
     /// body through the integration, and the control around the step.
     #[must_use]
     pub fn step_fill(&self) -> u32 {
-        unsigned(self.integration.schedule.depth) + self.parameters.read_latency() + AROUND_A_STEP
+        unsigned(self.integration.schedule.depth)
+            + self.parameters.read_latency()
+            + self.parameters.around().step
     }
 }
 
@@ -296,6 +317,7 @@ fn unsigned(cycle: i32) -> u32 {
 mod tests {
     use super::*;
     use crate::graph::{Kind, Operation, Source};
+    use pgs_interface::number::Precision;
 
     const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
@@ -377,7 +399,7 @@ mod tests {
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
         // The slowest one: the second quotient, with registers before and behind the divider.
-        let ready = Operation::Divide.operator().latency + 4;
+        let ready = Operation::Divide.operator(Precision::F32).latency + 4;
         // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];

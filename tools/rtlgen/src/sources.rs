@@ -1,5 +1,6 @@
 //! The Verilog of the repository, as part of the program.
 
+use pgs_interface::number::Precision;
 use pgs_interface::profile::{self, Profile};
 
 /// A file of Verilog.
@@ -22,11 +23,31 @@ macro_rules! sources {
     };
 }
 
-/// The operators, each after the modules that it is made of.
-pub const OPERATORS: &[Source<'_>] = sources! {
-    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
-        "fmax_or", "fmin_or", "fless", "fselect", "fnonzero", "flogic_or", "flogic_and";
+/// The arithmetic operators of binary32, each after the modules that it is made of.
+const BINARY32: &[Source<'_>] = sources! {
+    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos";
 };
+
+/// The ones of binary16, and the conversion to it.
+const BINARY16: &[Source<'_>] = sources! {
+    "operators/": "hnormal", "hround", "hadd", "hmul", "hdiv", "hsqrt", "hsincos", "float_to_half";
+};
+
+/// Comparisons and selections, which have the width as a parameter.
+const OF_BOTH: &[Source<'_>] = sources! {
+    "operators/": "fbelow", "fmax", "fmin", "fmax_or", "fmin_or", "fless", "fselect", "fnonzero",
+        "flogic_or", "flogic_and";
+};
+
+/// The operators of a precision.
+#[must_use]
+pub fn operators(precision: Precision) -> Vec<Source<'static>> {
+    let arithmetic = match precision {
+        Precision::F32 => BINARY32,
+        Precision::Binary16 => BINARY16,
+    };
+    [arithmetic, OF_BOTH].concat()
+}
 
 /// Modules of every profile.
 const COMMON: &[Source<'_>] = sources! {
@@ -54,9 +75,9 @@ const HALF: &[Source<'_>] = sources! {
 };
 
 /// The hand-written modules of a profile.
-pub fn of(profile: &Profile) -> impl Iterator<Item = &'static Source<'static>> {
+pub fn of(profile: &Profile) -> impl Iterator<Item = Source<'static>> {
     let own = if profile.id == profile::HALF.id { HALF } else { FLOAT };
-    OPERATORS.iter().chain(COMMON).chain(own)
+    operators(profile.numbers.updates).into_iter().chain([COMMON, own].concat())
 }
 
 #[cfg(test)]
@@ -67,7 +88,7 @@ mod tests {
     use super::*;
 
     fn all() -> impl Iterator<Item = &'static Source<'static>> {
-        OPERATORS.iter().chain(COMMON).chain(FLOAT).chain(HALF)
+        [BINARY32, BINARY16, OF_BOTH, COMMON, FLOAT, HALF].into_iter().flatten()
     }
 
     fn verilog_below(folder: &Path, files: &mut Vec<String>) -> io::Result<()> {

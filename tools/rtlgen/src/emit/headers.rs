@@ -6,11 +6,11 @@ use pgs_interface::control::{
     issue, memory_per_record, numbers,
 };
 use pgs_interface::fence::Fence;
-use pgs_interface::number::Numbers;
+use pgs_interface::number::{Numbers, Precision};
 use pgs_interface::profile::{Depth, Inertia, solver};
 
 use crate::design::Design;
-use crate::operators;
+use crate::{number, operators};
 
 use super::text::{Text, line};
 
@@ -41,17 +41,25 @@ pub(super) fn interface() -> String {
         }
         constant(text, 32, "ITERATIONS_MAX", ITERATIONS_MAX);
         constant(text, 32, "QUEUE_PATIENCE", QUEUE_PATIENCE);
-        constant(text, 32, "SOLVER_ROTATION_LIMIT", solver::ROTATION_LIMIT.to_bits());
-        constant(text, 32, "SOLVER_SERIES_TERM", solver::SERIES_TERM.to_bits());
+        for (name, value) in [
+            ("SOLVER_ROTATION_LIMIT", solver::ROTATION_LIMIT),
+            ("SOLVER_SERIES_TERM", solver::SERIES_TERM),
+        ] {
+            constant(text, 32, name, value.to_bits());
+            constant(text, 16, &format!("{name}_HALF"), number::bits(Precision::Binary16, value));
+        }
     })
 }
 
 /// `pgs_operators.vh`: latencies.
-pub(super) fn operators() -> String {
+pub(super) fn operators(precision: Precision) -> String {
     header(|text| {
-        for operator in operators::ALL.map(|operation| operation.operator()) {
+        for operator in operators::ALL.map(|operation| operation.operator(precision)) {
             let name = format!("{}_LATENCY", operator.module.to_uppercase());
             constant(text, 6, &name, u32::try_from(operator.latency).unwrap_or(0));
+        }
+        if precision == Precision::Binary16 {
+            constant(text, 6, "FLOAT_TO_HALF_LATENCY", operators::FLOAT_TO_HALF);
         }
     })
 }

@@ -10,9 +10,10 @@
 //! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
 //! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
-//! rest it keeps its pose, too. The arguments of the sine and of the cosine are the same number,
-//! for a factor of 0.5 is exact.
+//! rest it keeps its pose, too. In binary32 the arguments of the sine and of the cosine are the same
+//! number, for a factor of 0.5 is exact; in binary16 it rounds a subnormal number.
 
+use pgs_interface::number::Precision;
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
 
 use crate::graph::{Graph, Operand, Source, Vec3};
@@ -20,8 +21,8 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 /// The graph of the integration. `integrates` is 0 in a step without integration, where bodies keep
 /// their state; `free` is 1 for a body with a mass in a step with integration.
 #[must_use]
-pub fn integration() -> Graph {
-    let mut graph = Graph::default();
+pub fn integration(precision: Precision) -> Graph {
+    let mut graph = Graph::new(precision);
     let g = &mut graph;
     let position = g.input3(Source::Record, "position");
     let orientation = g.input4(Source::Record, "orientation");
@@ -87,7 +88,15 @@ fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
     let angle = g.multiply(speed, time_step);
     let half = g.constant(0.5);
     let half_angle = g.multiply(angle, half);
-    let [sine, cosine] = g.sine_cosine(half_angle);
+    let [_, cosine] = g.sine_cosine(half_angle);
+    let of_sine = match g.precision() {
+        Precision::F32 => half_angle,
+        Precision::Binary16 => {
+            let half_speed = g.multiply(speed, half);
+            g.multiply(half_speed, time_step)
+        }
+    };
+    let [sine, _] = g.sine_cosine(of_sine);
     let by_sine = g.divide(sine, speed);
     let scale = g.select(slow, by_series, by_sine);
     let Vec3([x, y, z]) = g.scale(angular, scale);
