@@ -106,6 +106,14 @@ pub enum BuildError {
         /// The requested depth.
         queue: u32,
     },
+    /// More bodies than an index of the profile's words can name.
+    #[error("{bodies} bodies, expected at most {most}")]
+    Bodies {
+        /// The requested number.
+        bodies: u32,
+        /// The largest number.
+        most: u32,
+    },
     /// Collisions leave a queue one by one.
     #[error("an issue queue of {queue} collisions in profile {profile}, expected none")]
     NoQueue {
@@ -145,6 +153,10 @@ impl Parameters {
         }
         if !profile.inertias().contains(&self.inertia) {
             return Err(BuildError::NoInertia { profile: profile.name });
+        }
+        let most = self.variant().body_capacity();
+        if self.bodies > most {
+            return Err(BuildError::Bodies { bodies: self.bodies, most });
         }
         if queue > 0 && !profile.has_queue() {
             return Err(BuildError::NoQueue { queue, profile: profile.name });
@@ -219,7 +231,7 @@ struct Around {
 /// Around a step: set-up in front of the first pass (10), the end of the load (2), the entry into
 /// the integration (1), the result FIFOs and their end (5), the sums and the end (3).
 const AROUND_FLOAT: Around = Around { pass: 8, step: 21, interval: 1 };
-const AROUND_HALF: Around = Around { pass: 9, step: 32, interval: 4 };
+const AROUND_HALF: Around = Around { pass: 9, step: 25, interval: 4 };
 
 impl Parameters {
     fn around(&self) -> &'static Around {
