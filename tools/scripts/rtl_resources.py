@@ -37,9 +37,8 @@ LIMITS = ({LUT: 200_000, DSP: 540}, {LUT: 225_000, DSP: 610})
 
 # The part of a module and of all below it, unless one of them is a part of its own.
 PARTS = {
-    "contact": "contact pipeline",
-    "friction": "friction pipeline",
-    "integration": "integration pipeline",
+    "solver": "solver: contact and friction",
+    "integration": "integration",
     "receiver": "streams",
     "sender": "streams",
     "finder": "finder with last uses, issue",
