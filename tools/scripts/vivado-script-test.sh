@@ -70,6 +70,12 @@ for board in zcu104 kv260 zcu102; do
 	fences DDR_LOW '0x0050000000 \+ 0x4000000' "$said"
 	[[ $said != *warning* ]] || fail "a warning: $said"
 done
+# Three streams, one of them narrow: a DMA core, a port and two interrupts less.
+cp -r "$folder/rtl" "$folder/three"
+sed -i 's/, [sm]3_axis_[a-z]*//; s/:[sm]3_axis//g' "$folder/three/pgs_top.v"
+sed -i 's/128 128 128 128/128 128 128/; s/ 0xA0030000//' "$folder/three/pgs_vivado.tcl"
+said=$(mock tools/vivado/build.tcl -rtl "$folder/three" -until design) || fail "three streams: the script is refused: $said"
+[[ $said = *"7 sources on pl_ps_irq0"* && $said != *HP3* ]] || fail "three streams: $said"
 generate high --memory 0x840000000+1G
 said=$(mock tools/vivado/build.tcl -rtl "$folder/high" -until design) || fail "another memory: $said"
 fences DDR_HIGH '0x0840000000 \+ 0x40000000' "$said"

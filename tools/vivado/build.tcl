@@ -11,6 +11,7 @@
 #   HPM0_FPD ---------> registers -----> S_AXI_LITE of dma0..dma3, s_axi of the accelerator
 #   HP0..HP3 <--------- memory0..3 <---- SG, MM2S and S2MM of dma0..dma3: one segment a master, the fence
 #                                        dma0..dma3 <===> s0_axis..s3_axis, m0_axis..m3_axis
+#                                        (a profile with three streams has no dma3, memory3, HP3)
 #   pl_ps_irq0[0] <---- interrupts <---- both channels of dma0..dma3, the accelerator
 #   pl_clk0 (100 MHz) -+--------------> registers: HPM0_FPD, their SmartConnect, S_AXI_LITE of dma0..dma3
 #                      +-> clock (MMCM) -> everything else, with the registers of the accelerator
@@ -82,8 +83,8 @@ proc build::read_numbers {rtl} {
 		error "no $file: cargo run --release -p rtlgen -- generate --out $rtl"
 	}
 	uplevel #0 [list source $file]
-	# pgs_interrupts.v is wired for four cores.
-	if {[llength $pgs(dma_addresses)] != 4} { error "this script wires four AXI DMAs" }
+	# pgs_interrupts.v and the memory ports are for four cores.
+	if {[llength $pgs(dma_addresses)] > 4} { error "this script wires four AXI DMAs at most" }
 	if {$pgs(interrupt_bit) != 0} { error "this script wires bit 0 of pl_ps_irq0" }
 }
 
@@ -209,13 +210,13 @@ proc build::add_processor {} {
 	configure processor {
 		PSU__USE__M_AXI_GP0 1 PSU__USE__M_AXI_GP1 0 PSU__USE__M_AXI_GP2 0
 		PSU__MAXIGP0__DATA_WIDTH 128
-		PSU__USE__S_AXI_GP2 1 PSU__USE__S_AXI_GP3 1 PSU__USE__S_AXI_GP4 1 PSU__USE__S_AXI_GP5 1
-		PSU__SAXIGP2__DATA_WIDTH 128 PSU__SAXIGP3__DATA_WIDTH 128
-		PSU__SAXIGP4__DATA_WIDTH 128 PSU__SAXIGP5__DATA_WIDTH 128
 		PSU__USE__IRQ0 1
 		PSU__FPGA_PL0_ENABLE 1
 	}
 	configure processor [list PSU__CRL_APB__PL0_REF_CTRL__FREQMHZ $pgs(pl_clock_mhz)]
+	for {set gp 2} {$gp < [llength $pgs(dma_addresses)] + 2} {incr gp} {
+		configure processor [list PSU__USE__S_AXI_GP$gp 1 PSU__SAXIGP${gp}__DATA_WIDTH 128]
+	}
 }
 
 # The PLLs of the processing system of the board's preset do not make 275 MHz. An MMCM makes the clock from
@@ -280,9 +281,9 @@ proc build::add_dma {k} {
 	set out [lindex $pgs(s2mm_stream_bits) $k]
 	add_ip axi_dma dma$k [list c_include_sg 1 c_sg_include_stscntrl_strm 0 c_micro_dma 0 \
 		c_sg_length_width $pgs(dma_length_bits) c_addr_width $pgs(dma_address_bits) \
-		c_include_mm2s 1 c_m_axi_mm2s_data_width $in c_m_axis_mm2s_tdata_width $in \
+		c_include_mm2s 1 c_m_axi_mm2s_data_width 128 c_m_axis_mm2s_tdata_width $in \
 		c_include_mm2s_dre 0 c_mm2s_burst_size 16 \
-		c_include_s2mm 1 c_m_axi_s2mm_data_width $out c_s_axis_s2mm_tdata_width $out \
+		c_include_s2mm 1 c_m_axi_s2mm_data_width 128 c_s_axis_s2mm_tdata_width $out \
 		c_include_s2mm_dre 0 c_s2mm_burst_size 16]
 	slowly_clocked dma$k s_axi_lite_aclk axi_resetn
 	clocked dma$k {m_axi_sg_aclk m_axi_mm2s_aclk m_axi_s2mm_aclk} {}
@@ -313,6 +314,8 @@ proc build::build_design {khz} {
 	# AxPROT[1]
 	add_ip xlconstant non_secure {CONST_WIDTH 3 CONST_VAL 2}
 	for {set k 0} {$k < [llength $pgs(dma_addresses)]} {incr k} { add_dma $k }
+	if {$k < 4} { add_ip xlconstant no_interrupt {CONST_WIDTH 1 CONST_VAL 0} }
+	for {} {$k < 4} {incr k} { wire no_interrupt/dout interrupts/mm2s$k interrupts/s2mm$k }
 	add_registers
 	validate_bd_design
 	check_fences

@@ -656,7 +656,12 @@ proc check_interrupt {} {
 	if {![regexp "assign\\s+$output\\s*=(\[^;\]*);" $text - expression]} { refuse "$cells($any): no assign of $output" }
 	set terms [lmap term [split $expression |] { string trim $term }]
 	if {[lsort $terms] ne [lsort $inputs]} { refuse "$cells($any): $output is not the OR of all inputs: $expression" }
-	set sources [lsort [lmap input $inputs { source_of $any/$input }]]
+	# A constant 0 is no source.
+	set sources [lsort [lmap input $inputs {
+		lassign [split [source_of $any/$input] /] cell
+		if {[info exists cells($cell)] && $cells($cell) eq "xlconstant" && [value $cell CONST_VAL] == 0} continue
+		source_of $any/$input
+	}]]
 	set expected [list [accelerator]/irq]
 	foreach core [cells_of axi_dma] { lappend expected $core/mm2s_introut $core/s2mm_introut }
 	if {$sources ne [lsort $expected]} { refuse "interrupts $sources, not [lsort $expected]" }
@@ -742,14 +747,14 @@ proc check_parameters {} {
 		set out [lindex $pgs(s2mm_stream_bits) $k]
 		foreach {name expected} [list c_include_sg 1 c_sg_include_stscntrl_strm 0 c_micro_dma 0 \
 			c_sg_length_width $pgs(dma_length_bits) c_addr_width $pgs(dma_address_bits) \
-			c_include_mm2s 1 c_m_axi_mm2s_data_width $in c_m_axis_mm2s_tdata_width $in c_include_mm2s_dre 0 \
-			c_include_s2mm 1 c_m_axi_s2mm_data_width $out c_s_axis_s2mm_tdata_width $out \
+			c_include_mm2s 1 c_m_axi_mm2s_data_width 128 c_m_axis_mm2s_tdata_width $in c_include_mm2s_dre 0 \
+			c_include_s2mm 1 c_m_axi_s2mm_data_width 128 c_s_axis_s2mm_tdata_width $out \
 			c_include_s2mm_dre 0 c_mm2s_burst_size 16 c_s2mm_burst_size 16] {
 			if {[value $core $name] != $expected} { refuse "$core: $name is [value $core $name], not $expected" }
 		}
 	}
 	set processor [cells_of zynq_ultra_ps_e]
-	foreach port {MAXIGP0 SAXIGP2 SAXIGP3 SAXIGP4 SAXIGP5} {
+	foreach port [lrange {MAXIGP0 SAXIGP2 SAXIGP3 SAXIGP4 SAXIGP5} 0 $k] {
 		set bits [value $processor PSU__${port}__DATA_WIDTH]
 		if {$bits != 128} { refuse "$port has $bits bits; the overlays set the ports to 128" }
 	}
