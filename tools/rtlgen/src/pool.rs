@@ -43,8 +43,8 @@ impl Unit {
     }
 }
 
-/// Operands of which a unit's port chooses one: a choice between four is a LUT a bit, and one
-/// level of logic.
+/// The most operands among which a port of a unit chooses: four take a LUT a bit, and one level of
+/// logic.
 const CHOICES: usize = 4;
 
 /// The units of some pipelines: a comparison or a selection is as small as the choice between its
