@@ -189,7 +189,7 @@ script=build.tcl
 for build in rtl world kv260 zcu104; do
 	command -v yosys >/dev/null || break
 	yosys -q -p "read_verilog -I$folder/$build $(sed "s|^|$folder/$build/|" "$folder/$build/pgs.f" | tr '\n' ' ')
-		blackbox pgs_solver; hierarchy -top pgs_top; proc; write_json $folder/memories.json"
+		blackbox pgs_solver; hierarchy -top pgs_top; proc; write_json $folder/memories.json" >"$folder/log" 2>&1 || fail "Yosys on $build: $(tail -n 3 "$folder/log")"
 	counted=$(python3 tools/scripts/rtl_memories.py "$folder/memories.json" | awk -F '[|* ]+' '/sum/ { total = $3 } /^. rows/ { rows = $7 } END { print total - rows }')
 	said=$(mock tools/vivado/build.tcl -rtl "$folder/$build" -until design | sed -n 's/^block RAM: \([0-9.]*\)\.0 .*/\1/p; s/^block RAM: \([0-9]*\.5\) .*/\1/p')
 	[ "$said" = "$counted" ] || fail "$build: the script counts $said blocks of RAM, the Verilog has $counted"
