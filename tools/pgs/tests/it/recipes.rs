@@ -1,5 +1,5 @@
 //! Every printed recipe that loads a bitstream names an overlay which goes with the only bitstream
-//! that can be built, that of `tools/vivado/zcu102.tcl`.
+//! that can be built, that of `tools/vivado/build.tcl`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
