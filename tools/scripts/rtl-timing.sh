@@ -31,7 +31,7 @@ litter+=("$work")
 attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" --bodies 1024 --collisions 1024 >/dev/null
 cp -r "$work" "$work.control"
 litter+=("$work.control")
-for module in pgs_contact pgs_friction pgs_integration pgs_fmul pgs_fdiv; do
+for module in pgs_solver pgs_fmul pgs_fdiv; do
 	python3 "$scripts/rtl_timing_wrap.py" stub "$work/$module.v" "$module" > "$work.control/$module.v"
 done
 

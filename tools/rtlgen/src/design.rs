@@ -131,7 +131,7 @@ impl Parameters {
 /// A pipeline: its equations and their schedule.
 #[derive(Debug)]
 pub struct Pipeline {
-    /// Name of the Verilog module.
+    /// Its name, which is also the prefix of its values in the Verilog.
     pub name: &'static str,
     /// The equations.
     pub graph: Graph,
@@ -144,6 +144,15 @@ impl Pipeline {
         let schedule = Schedule::new(&graph, interval);
         Self { name, graph, schedule }
     }
+}
+
+/// A module of the hardware: pipelines that never run together, on one pool of units.
+#[derive(Debug)]
+pub struct Module<'a> {
+    /// Its name in the Verilog, without the prefix `pgs_` of all modules.
+    pub name: &'static str,
+    /// The pipelines: one, two or three.
+    pub pipelines: Vec<&'a Pipeline>,
 }
 
 /// A build of profile `float`.
@@ -188,6 +197,12 @@ impl Design {
     #[must_use]
     pub fn pipelines(&self) -> [&Pipeline; 3] {
         [&self.contact, &self.friction, &self.integration]
+    }
+
+    /// The modules that the pipelines are.
+    #[must_use]
+    pub fn modules(&self) -> Vec<Module<'_>> {
+        vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }]
     }
 
     /// Fill and hazard window of a pipeline, if it is one of the passes.
