@@ -113,12 +113,13 @@ module pgs_core (
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
   );
 
-  wire [31:0] per_second, speed_limit, half_step, series;
+  wire [31:0] per_second, speed_limit, half_step, half_angle_limit, series;
   wire [95:0] gravity_step;
   pgs_constants #(.SMALLEST_NORMAL(DESIGN_SMALLEST_NORMAL)) numbers (
     .clk(clk), .start(start), .time_step(time_step),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
-    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step), .series(series),
+    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step),
+    .half_angle_limit(half_angle_limit), .series(series),
     .gravity_step(gravity_step)
   );
 
@@ -477,7 +478,7 @@ module pgs_core (
     .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .damping(body_damping),
     .integrates(integrate), .free(body_free),
     .time_step(time_step), .gravity_step(gravity_step),
-    .half_step(half_step), .series(series), .speed_limit(speed_limit),
+    .half_step(half_step), .series(series), .speed_limit(speed_limit), .half_angle_limit(half_angle_limit),
     .out_position(new_position), .out_orientation(new_orientation),
     .out_linear(new_linear), .out_angular(new_angular)
   );
