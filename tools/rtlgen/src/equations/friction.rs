@@ -24,8 +24,8 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 /// The graph of a friction pass.
 ///
 /// `per_count` is 1 / count, `coefficient_of_friction` the one of the collision, `impulse0` the
-/// normal impulse that the last contact pass stored, `impulse1` and `impulse2` G_0 and G_1, and `one_static` tells whether a body of the
-/// collision is static.
+/// normal impulse that the last contact pass stored, `impulse1` and `impulse2` the tangents'
+/// impulses, and `one_static` tells whether a body of the collision is static.
 #[must_use]
 pub fn friction(inertia: Inertia) -> Graph {
     let mut graph = Graph::default();
