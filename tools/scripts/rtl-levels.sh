@@ -12,6 +12,9 @@
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$repository"
+case ${1-} in
+-h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; exit 0 ;;
+esac
 yosys=${YOSYS:-yosys}
 command -v "$yosys" >/dev/null || need_packages yosys
 
