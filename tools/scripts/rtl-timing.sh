@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Places and routes modules of the accelerator on a Lattice ECP5 (LFE5U-85F, speed grade 8), prints how fast
 # each of them is, and of those that are more than an operator the longest path. It fails where one of them
-# is slower than `fmul`, and where a module has no clock. Two may be a tenth slower than `fmul`: the whole of
-# `fsincos`, whose 75 multipliers lie all over the device, so that more than half of its longest path is wires,
-# and the control, which has a path from a block RAM without output register, the FIFO of a sender.
+# is slower than `fmul`, and where a module has no clock. Three may be a tenth slower than `fmul`: the whole of
+# `fsincos`, whose 75 multipliers lie all over the device, so that more than half of its longest path is wires;
+# the queue, for its search; and the control, which has a path from a block RAM without output register, the
+# FIFO of a sender.
 #
 # The control is the accelerator with stubs in place of its pipelines and operators. `horner` has the widths of
 # the last steps of `fsincos`, the queue 16 places (the control has 64), the memory two tiles and the registers of
@@ -99,7 +100,7 @@ for module in "${modules[@]}"; do
 	horner | fsincos | queue | memory | control) longest_path "${top[0]}.log" ;;
 	esac
 	share=1
-	case $module in fsincos | control) share=0.9 ;; esac
+	case $module in fsincos | queue | control) share=0.9 ;; esac
 	[ -z "$fmul" ] || awk "BEGIN { exit !($mhz >= $share * $fmul) }" || slow+=("$module")
 done
 [ ${#slow[@]} = 0 ] || fail "too slow beside fmul: ${slow[*]}"

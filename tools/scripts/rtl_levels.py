@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
 """Counts what makes paths slow in netlists for UltraScale+, part by part.
 
-usage: rtl_levels.py [--enables MOST] NETLIST...     BLIF files of Yosys, flat
+usage: rtl_levels.py NETLIST...     BLIF files of Yosys, flat
 
 For each part of a netlist, which is the outermost instance that a register is in, without the digits of its name:
 the path through the most LUTs that ends at one of its registers or at a pin of a memory or multiplier, with the
 carries on it; then how many multipliers and block RAMs have nothing but registers on either side, which a tool can
-take into them; then the clock enables with the largest fan-out. Fails if one of them drives more than MOST pins.
+take into them.
 
 A LUT or a LUT memory is a level; the wide multiplexers behind LUTs are none. Carries are counted in fours of bits.
 Paths from and to the ports of a netlist count as well.
 """
-import argparse
 import collections
 import functools
 import re
@@ -29,7 +28,7 @@ class Netlist:
     """Drivers of the nets, and the cells that end a path."""
 
     def __init__(self, path):
-        self.drivers, self.ends, self.enables = {}, [], collections.Counter()
+        self.drivers, self.ends = {}, []
         self.hard = []
         with open(path, encoding="utf-8") as file:
             text = file.read().replace("\\\n", " ")
@@ -48,9 +47,6 @@ class Netlist:
             self.ends.append((outputs[0] if outputs else cell, inputs))
             if HARD.match(cell):
                 self.hard.append((cell, inputs, outputs))
-            for pin, net in pins:
-                if pin == "CE" and net not in ("$true", "$false"):
-                    self.enables[net] += 1
             return
         if cell.startswith("CARRY"):
             # A bit depends on the bits below.
@@ -100,13 +96,10 @@ def part_of(net):
 
 def main():
     """Prints the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--enables", type=int, default=1200)
-    parser.add_argument("netlists", nargs="+")
-    arguments = parser.parse_args()
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     sys.setrecursionlimit(1_000_000)
-    wide = False
-    for path in arguments.netlists:
+    for path in sys.argv[1:]:
         netlist = Netlist(path)
         parts = {}
         for end, inputs in netlist.ends:
@@ -121,11 +114,6 @@ def main():
             print(f"  {luts:3} levels{carry:16}  {part:28} {start} -> {end}")
         for cell, (count, front, behind) in netlist.registered():
             print(f"  {count:5} {cell}, {front} with registers in front, {behind} behind")
-        for net, count in netlist.enables.most_common(3):
-            wide |= count > arguments.enables
-            print(f"  {count:5} registers enabled by {net}")
-    if wide:
-        sys.exit(f"error: a clock enable drives more than {arguments.enables} registers")
 
 
 if __name__ == "__main__":
