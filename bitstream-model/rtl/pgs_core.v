@@ -331,7 +331,6 @@ module pgs_core (
     end
     if (phase) begin
       valid <= second & ~clear;
-      rows[511:0]              <= early;
       friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
@@ -339,11 +338,11 @@ module pgs_core (
     end
     if (clear) valid <= 1'b0;
   end
-  // One register enables no more than 1,200 bits, so that half of the rows has a copy of the phase.
-  (* keep = "true" *) reg phase_of_rest;
+  // One register enables no more than 1,200 bits, so that the rows have a copy of the phase.
+  (* keep = "true" *) reg phase_of_rows;
   always @(posedge clk) begin
-    phase_of_rest <= slot_begins;
-    if (phase_of_rest) rows[1023:512] <= rest_rows;
+    phase_of_rows <= slot_begins;
+    if (phase_of_rows) rows <= {rest_rows, early};
   end
 
   wire [3:0] used = {points > 3'd3, points > 3'd2, points > 3'd1, points != 3'd0};
