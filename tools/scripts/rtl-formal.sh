@@ -156,5 +156,14 @@ check pgs_sender pdr \
 	'has_room <= credits > 3' 'has_room <= credits > 2' \
 	'leaves & tlast & ~clear' 'leaves & ~clear' \
 	'given   <= leaves & ~clear' 'given   <= tready & ~clear'
+parts='' parameters='COLLISION=3 CONTACT_WINDOW=10 FRICTION_WINDOW=8'
+check pgs_issue pdr \
+	'(last_use_a[COLLISION-1:0] >= retired)' '(last_use_a[COLLISION-1:0] > retired)' \
+	'under_way[FRICTION_WINDOW/2-2]' 'under_way[FRICTION_WINDOW/2-3]' \
+	'under_way[CONTACT_WINDOW/2-2]' 'under_way[CONTACT_WINDOW/2-3]' \
+	'hazard <= hazard_a | hazard_b' 'hazard <= hazard_a' \
+	'moves_b & (last_use_b[COLLISION] == parity)' 'moves_b' \
+	'phase & there' 'there' \
+	'streams_ready & found' 'streams_ready'
 
 [ -z "$failed" ] || fail "${mutations:+a planted mistake is not found}${mutations:-a property does not hold}"
