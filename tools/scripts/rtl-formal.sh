@@ -96,8 +96,8 @@ report() {
 		failed=yes
 	elif grep -q "Property proved" "$folder/solver.log"; then
 		result="proven by induction, invariant of $(grep -o -E '[0-9]+ clauses' "$folder/solver.log" | head -n 1)"
-	elif result=$(grep -o -E 'No output asserted in [0-9]+ frames' "$folder/solver.log"); then
-		result="bounded, $(echo "$result" | grep -o -E '[0-9]+') cycles"
+	elif result=$(grep -o -E 'limit on the number of timeframes \([0-9]+' "$folder/solver.log"); then
+		result="bounded, ${result##*\(} cycles"
 	else
 		tail -n 5 "$folder/solver.log" >&2
 		result="UNDECIDED"
@@ -165,5 +165,20 @@ check pgs_issue pdr \
 	'moves_b & (last_use_b[COLLISION] == parity)' 'moves_b' \
 	'phase & there' 'there' \
 	'streams_ready & found' 'streams_ready'
+parts='' parameters=
+check pgs_control_block pdr \
+	'& ~sticky & ~failed) go' '& ~sticky) go' \
+	'start   <= ~arguments_wrong' "start   <= 1'b1" \
+	'contact_iterations > ITERATIONS_TOP' 'contact_iterations > ITERATIONS_TOP + 1' \
+	'writes & whole & ~resetting' 'writes & ~resetting' \
+	"3'b000)) | raised" "3'b000) & ier) | raised" \
+	'if (bready) bvalid' 'bvalid' \
+	'gie & |isr' '|isr'
+parts='pgs_fifo pgs_word_sum' parameters='CHANNEL=3'
+check pgs_receiver 'pdr -F 22' \
+	'tlast != beat_is_last' 'tlast & ~beat_is_last' \
+	"left == 21'd2" "left == 21'd3" \
+	'error_beat <= beat' 'error_beat <= left' \
+	'passes_left == before_friction' 'passes_left == passes'
 
 [ -z "$failed" ] || fail "${mutations:+a planted mistake is not found}${mutations:-a property does not hold}"
