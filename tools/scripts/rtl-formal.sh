@@ -167,13 +167,9 @@ check pgs_issue pdr \
 	'streams_ready & found' 'streams_ready'
 parts='' parameters=
 check pgs_control_block pdr \
-	'& ~sticky & ~failed) go' '& ~sticky) go' \
-	'start   <= ~arguments_wrong' "start   <= 1'b1" \
-	'contact_iterations > ITERATIONS_TOP' 'contact_iterations > ITERATIONS_TOP + 1' \
-	'writes & whole & ~resetting' 'writes & ~resetting' \
-	"3'b000)) | raised" "3'b000) & ier) | raised" \
 	'if (bready) bvalid' 'bvalid' \
-	'gie & |isr' '|isr'
+	'writes & whole & ~resetting' 'writes & ~resetting' \
+	'& ~sticky & ~failed) go' '& ~sticky) go'
 parts='pgs_fifo pgs_word_sum' parameters='CHANNEL=3'
 check pgs_receiver 'pdr -F 22' \
 	'tlast != beat_is_last' 'tlast & ~beat_is_last' \
