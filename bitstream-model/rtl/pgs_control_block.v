@@ -305,6 +305,7 @@ module pgs_control_block (
       OFFSET_MEMORY_BYTES:       capability_read <= CAPABILITY_MEMORY_BYTES;
       OFFSET_MEMORY_PER_RECORD:  capability_read <= CAPABILITY_MEMORY_PER_RECORD;
       OFFSET_DMA:                capability_read <= CAPABILITY_DMA;
+      OFFSET_NUMBERS:            capability_read <= CAPABILITY_NUMBERS;
       OFFSET_QUEUE:              capability_read <= CAPABILITY_QUEUE;
       OFFSET_FENCE_BASE:         capability_read <= CAPABILITY_FENCE_BASE;
       OFFSET_FENCE_SIZE:         capability_read <= CAPABILITY_FENCE_SIZE;

@@ -106,7 +106,7 @@ module pgs_core (
     .loads(|load_pops), .load_finished(load_finished),
     .issues(issues), .stalls(stalls), .waits(waits),
     .enters(enters), .enter_finished(enter_finished), .results_finished(&sender_finished),
-    .busy(busy), .done(done), .phase(phase), .slot_begins(slot_begins), .loading(loading), .finding(finding), .passing(passing),
+    .busy(busy), .done(done), .phases({phase, slot_begins}), .loading(loading), .finding(finding), .passing(passing),
     .last_issue(last_issue), .draining(draining), .begin_pass(begin_pass), .integrating(integrating),
     .friction(friction), .first_of_kind(first_of_kind), .last_contact(last_contact), .parity(parity),
     .warm(warm), .next_warm(next_warm), .sends(sends), .next_sends(next_sends),
@@ -132,19 +132,28 @@ module pgs_core (
   wire [31:0]  received [0:3];
   wire [20:0]  wrong_beat [0:3];
   wire [7:0]   wrong_code [0:3];
-  wire [3:0]   pop, wrong, collision_begins;
+  wire [3:0]   pop, wrong, comes, collision_begins;
+  wire [1:0]   place [0:3];
   genvar k;
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_receiver
-      pgs_receiver #(.CHANNEL(k), .WORLD_INERTIA(DESIGN_WORLD_INERTIA)) stream (
+      // The beats of a body are dealt to the four streams in turn: two a body, and four for a velocity with world
+      // inertia. Of the seven beats of a collision, streams 0, 1 and 2 carry two, and stream 3 carries one. In a
+      // warm pass stream 3 carries a second one, the impulses.
+      localparam integer OFFSET = 3 - k;
+      reg [20:0] body_beats;
+      always @(posedge clk) body_beats <= ({bodies, 1'b0} + OFFSET[20:0]) >> 2;
+      pgs_receiver #(.GROUP(2)) stream (
         .clk(clk), .stop(reset | error), .start(start), .clear(clear),
-        .bodies(bodies), .collisions(collisions),
+        .velocity_beats((DESIGN_WORLD_INERTIA != 0) ? {1'b0, bodies} : body_beats), .pose_beats(body_beats),
+        .pass_beats((k == 3) ? {1'b0, collisions} : {collisions, 1'b0}), .warm_beats({collisions, 1'b0}),
         .passes(passes), .friction_passes(friction_passes), .warm_start(warm_start),
         .tdata(s_tdata[128*k +: 128]), .tkeep(s_tkeep[16*k +: 16]), .tlast(s_tlast[k]),
         .tvalid(s_tvalid[k]), .tready(s_tready[k]),
-        .head(head[k]), .count(count[k]), .there(there[k]), .pop(pop[k]), .collision_begins(collision_begins[k]),
+        .head(head[k]), .count(count[k]), .there(there[k]), .pop(pop[k]), .comes(comes[k]), .place(place[k]),
         .sum(received[k]), .error(wrong[k]), .error_code(wrong_code[k]), .error_beat(wrong_beat[k])
       );
+      assign collision_begins[k] = comes[k] & (place[k] == 2'd0);
     end
   endgenerate
   reg [31:0] received_low, received_high;
@@ -505,7 +514,7 @@ module pgs_core (
   generate
     for (k = 0; k < 4; k = k + 1) begin : g_sender
       pgs_sender #(.ADDRESS(10)) stream (
-        .clk(clk), .clear(clear), .stop(error), .bodies(bodies),
+        .clk(clk), .clear(clear), .stop(error), .rows_of_results(bodies),
         .enters(enters | ((k == 0) & ((issues & sends) | numbers_follow))), .has_room(room[k]),
         .push(result_valid | ((k == 0) & (impulse_valid | numbers_valid))), .result(result_valid), .row(result[k]),
         .tdata(m_tdata[128*k +: 128]), .tlast(m_tlast[k]), .tvalid(m_tvalid[k]), .tready(m_tready[k]),

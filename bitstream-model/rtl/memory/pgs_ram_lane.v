@@ -7,6 +7,7 @@ module pgs_ram_lane #(
   parameter integer DEPTH   = 4096,
   parameter integer ADDRESS = 12,
   parameter integer TILE    = 12,
+  parameter integer READ_FIRST = 0,
   parameter integer READS_A = 1
 ) (
   input  wire               clk,
@@ -25,7 +26,7 @@ module pgs_ram_lane #(
     if (TILES == 1) begin : g_one
       localparam WITHIN = (ADDRESS < TILE) ? ADDRESS : TILE;
       wire unused = &{1'b0, address_a, address_b};
-      pgs_ram_tile #(.WIDTH(WIDTH), .ADDRESS(WITHIN)) tile (
+      pgs_ram_tile #(.WIDTH(WIDTH), .ADDRESS(WITHIN), .READ_FIRST(READ_FIRST)) tile (
         .clk(clk),
         .select_a(1'b1), .write_a(write_a), .address_a(address_a[WITHIN-1:0]), .in_a(in_a), .out_a(out_a),
         .select_b(1'b1), .write_b(write_b), .address_b(address_b[WITHIN-1:0]), .in_b(in_b), .out_b(out_b)
@@ -42,7 +43,7 @@ module pgs_ram_lane #(
       wire [WIDTH-1:0] from_a [0:TILES-1];
       wire [WIDTH-1:0] from_b [0:TILES-1];
       for (i = 0; i < TILES; i = i + 1) begin : g_tile
-        pgs_ram_tile #(.WIDTH(WIDTH), .ADDRESS(TILE)) tile (
+        pgs_ram_tile #(.WIDTH(WIDTH), .ADDRESS(TILE), .READ_FIRST(READ_FIRST)) tile (
           .clk(clk),
           .select_a(address_a[ADDRESS-1:TILE] == i), .write_a(write_a), .address_a(address_a[TILE-1:0]),
           .in_a(in_a), .out_a(from_a[i]),

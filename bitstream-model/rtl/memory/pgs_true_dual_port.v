@@ -4,7 +4,8 @@
 // of a word, as far as they make whole nines, lie in tiles of 4,096 words, and the rest in the deepest tiles that
 // hold it. With 131,072 words of 64 bits that takes 228 blocks, in tiles of 4,096 words alone 256.
 //
-// A read of an address that is written in the same cycle gives an undefined word.
+// A read of an address that is written in the same cycle gives an undefined word; with READ_FIRST the port that writes
+// gives the word that it replaces.
 // Both ports must not write one address in one cycle.
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
@@ -19,6 +20,7 @@ module pgs_true_dual_port #(
   parameter integer ADDRESS        = 10,
   parameter integer ADDRESS_STAGES = 0,
   parameter integer OUTPUT_STAGES  = 1,
+  parameter integer READ_FIRST     = 0,
   parameter integer READS_A        = 1
 ) (
   input  wire               clk,
@@ -54,14 +56,14 @@ module pgs_true_dual_port #(
 
   generate
     if (NINES != 0) begin : g_nines
-      pgs_ram_lane #(.WIDTH(NINES), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(12), .READS_A(READS_A)) lane (
+      pgs_ram_lane #(.WIDTH(NINES), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(12), .READ_FIRST(READ_FIRST), .READS_A(READS_A)) lane (
         .clk(clk),
         .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[NINES-1:0]), .out_a(read_a[NINES-1:0]),
         .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[NINES-1:0]), .out_b(read_b[NINES-1:0])
       );
     end
     if (REST != 0) begin : g_rest
-      pgs_ram_lane #(.WIDTH(REST), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(TILE), .READS_A(READS_A)) lane (
+      pgs_ram_lane #(.WIDTH(REST), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(TILE), .READ_FIRST(READ_FIRST), .READS_A(READS_A)) lane (
         .clk(clk),
         .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[WIDTH-1:NINES]), .out_a(read_a[WIDTH-1:NINES]),
         .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[WIDTH-1:NINES]), .out_b(read_b[WIDTH-1:NINES])

@@ -1,29 +1,36 @@
-// The smaller of two binary32 numbers: y = a < b ? a : b.
+// The smaller of two numbers, binary32 or (WIDTH = 16) binary16: y = a < b ? a : b.
 //
 // Latency 1. The form decides the rest: equal operands, zeros of both signs among them, give b, and
-// so does a NaN in either operand. Subnormals: an operand counts as a zero of its sign, also as the
-// result.
+// so does a NaN in either operand. Subnormals of binary32: an operand counts as a zero of its sign,
+// also as the result.
 //
 // Rules: bitstream-model/README.md, section 7.
 `default_nettype none
 
-module pgs_fmin (
-  input  wire        clk,
-  input  wire [31:0] a,
-  input  wire [31:0] b,
-  output reg  [31:0] y
+module pgs_fmin #(
+  parameter integer WIDTH = 32
+) (
+  input  wire             clk,
+  input  wire [WIDTH-1:0] a,
+  input  wire [WIDTH-1:0] b,
+  output reg  [WIDTH-1:0] y
 );
 
   wire a_below_b;
 
-  pgs_fbelow compare (
+  pgs_fbelow #(.WIDTH(WIDTH)) compare (
     .a(a),
     .b(b),
     .y(a_below_b)
   );
 
-  wire [31:0] a_flushed = {a[31:23], a[22:0] & {23{|a[30:23]}}};
-  wire [31:0] b_flushed = {b[31:23], b[22:0] & {23{|b[30:23]}}};
+  // Binary16 has no subnormals that count as zeros.
+  localparam FRACTION = (WIDTH == 32) ? 23 : 10;
+
+  wire a_stays = (WIDTH != 32) | (|a[WIDTH-2:FRACTION]);
+  wire b_stays = (WIDTH != 32) | (|b[WIDTH-2:FRACTION]);
+  wire [WIDTH-1:0] a_flushed = {a[WIDTH-1:FRACTION], a[FRACTION-1:0] & {FRACTION{a_stays}}};
+  wire [WIDTH-1:0] b_flushed = {b[WIDTH-1:FRACTION], b[FRACTION-1:0] & {FRACTION{b_stays}}};
 
   always @(posedge clk) begin
     y <= a_below_b ? a_flushed : b_flushed;

@@ -5,6 +5,9 @@
 //
 // GAPS and STALLS: TVALID gaps in front of the accelerator and TREADY stalls behind it, in a thousand
 // cycles, at random. WAVEFORM: the VCD file that a `record` request begins.
+//
+// STREAMS, the number of streams each way, comes from the generator. A stream of 64 bits carries a beat in two
+// transfers, low bits first.
 #include <unistd.h>
 
 #include <cstdint>
@@ -19,7 +22,9 @@
 #include "verilated_vcd_c.h"
 #endif
 
-static const int STREAMS = 4;
+static const int MESSAGE_STREAMS = 4;  // in requests and answers
+static const int WORDS = 4;            // of a beat
+static const uint32_t RESET_OFFSET = 0x1c0;
 static const int READ_CLOCKS = 16;  // a read is answered long before
 static const size_t BEAT_WORDS = 5;  // four words and the marks
 
@@ -92,17 +97,42 @@ static void rising_edge() {
 
 struct Stream {
   CData *tvalid, *tready, *tlast;
-  SData *tkeep;
   WData *tdata;
+  int words;         // of a transfer
+  int at;            // words of the beat that have been transferred
+  uint32_t beat[WORDS];
 };
+
+static Stream stream(CData &tvalid, CData &tready, CData &tlast, VlWide<WORDS> &tdata) {
+  return {&tvalid, &tready, &tlast, &tdata[0], WORDS, 0, {}};
+}
+
+static Stream stream(CData &tvalid, CData &tready, CData &tlast, QData &tdata) {
+  return {&tvalid, &tready, &tlast, reinterpret_cast<WData *>(&tdata), WORDS / 2, 0, {}};
+}
 
 static Stream inputs[STREAMS], outputs[STREAMS];
 
 static void connect() {
-#define IN(k) inputs[k] = {&top->s##k##_axis_tvalid, &top->s##k##_axis_tready, &top->s##k##_axis_tlast, &top->s##k##_axis_tkeep, &top->s##k##_axis_tdata[0]};
-#define OUT(k) outputs[k] = {&top->m##k##_axis_tvalid, &top->m##k##_axis_tready, &top->m##k##_axis_tlast, nullptr, &top->m##k##_axis_tdata[0]};
-  IN(0) IN(1) IN(2) IN(3)
-  OUT(0) OUT(1) OUT(2) OUT(3)
+#define PORTS(side, k) stream(top->side##k##_axis_tvalid, top->side##k##_axis_tready, top->side##k##_axis_tlast, top->side##k##_axis_tdata)
+#define STREAM(k) inputs[k] = PORTS(s, k), outputs[k] = PORTS(m, k);
+  STREAM(0) STREAM(1) STREAM(2)
+#if STREAMS > 3
+  STREAM(3)
+#endif
+}
+
+static void set_tkeep(int k, bool whole) {
+  const int bytes = 4 * inputs[k].words;
+  const int keep = whole ? (1 << bytes) - 1 : (1 << (bytes - 4)) - 1;
+  switch (k) {
+    case 0: top->s0_axis_tkeep = keep; break;
+    case 1: top->s1_axis_tkeep = keep; break;
+    case 2: top->s2_axis_tkeep = keep; break;
+#if STREAMS > 3
+    case 3: top->s3_axis_tkeep = keep; break;
+#endif
+  }
 }
 
 static void idle_streams() {
@@ -126,6 +156,9 @@ static uint32_t read_register(uint32_t offset) {
 
 static void write_register(uint32_t offset, uint32_t value) {
   idle_streams();
+  // A reset drops the rest of a beat.
+  if (offset == RESET_OFFSET)
+    for (int k = 0; k < STREAMS; k++) inputs[k].at = outputs[k].at = 0;
   top->s_axi_awaddr = offset;
   top->s_axi_wdata = value;
   top->s_axi_awvalid = top->s_axi_wvalid = 1;
@@ -142,10 +175,11 @@ static bool busy() {
 
 static void run(uint32_t limit, uint32_t gaps, uint32_t stalls) {
   static std::vector<uint32_t> offered[STREAMS], sent[STREAMS];
-  static bool held[STREAMS];  // a beat once offered stays offered
-  uint32_t count[STREAMS], space[STREAMS], taken[STREAMS] = {0, 0, 0, 0}, clocks = 0;
+  static bool held[STREAMS];  // a transfer once offered stays offered
+  uint32_t count[MESSAGE_STREAMS], space[MESSAGE_STREAMS], taken[MESSAGE_STREAMS] = {0, 0, 0, 0}, clocks = 0;
   receive(count, sizeof count);
   receive(space, sizeof space);
+  // The streams that the accelerator does not have carry nothing.
   for (int k = 0; k < STREAMS; k++) {
     offered[k].resize(BEAT_WORDS * count[k]);
     receive(offered[k].data(), 4 * offered[k].size());
@@ -157,20 +191,28 @@ static void run(uint32_t limit, uint32_t gaps, uint32_t stalls) {
       *inputs[k].tvalid = held[k];
       if (held[k]) {
         const uint32_t *beat = &offered[k][BEAT_WORDS * taken[k]];
-        memcpy(inputs[k].tdata, beat, 16);
-        *inputs[k].tlast = beat[4] & 1;
-        *inputs[k].tkeep = beat[4] & 2 ? 0x0fff : 0xffff;
+        const bool ends = inputs[k].at + inputs[k].words == WORDS;
+        memcpy(inputs[k].tdata, beat + inputs[k].at, 4 * inputs[k].words);
+        *inputs[k].tlast = ends && beat[WORDS] & 1;
+        set_tkeep(k, !(ends && beat[WORDS] & 2));
       }
-      *outputs[k].tready = sent[k].size() < BEAT_WORDS * space[k] && (stalls == 0 || per_mille() >= stalls);
+      const bool room = outputs[k].at > 0 || sent[k].size() < BEAT_WORDS * space[k];
+      *outputs[k].tready = room && (stalls == 0 || per_mille() >= stalls);
     }
     top->eval();
     for (int k = 0; k < STREAMS; k++) {
       if (*outputs[k].tvalid && *outputs[k].tready) {
-        sent[k].insert(sent[k].end(), outputs[k].tdata, outputs[k].tdata + 4);
-        sent[k].push_back(*outputs[k].tlast | clocks << 8);
+        Stream &out = outputs[k];
+        memcpy(out.beat + out.at, out.tdata, 4 * out.words);
+        out.at = (out.at + out.words) % WORDS;
+        if (out.at == 0) {
+          sent[k].insert(sent[k].end(), out.beat, out.beat + WORDS);
+          sent[k].push_back(*out.tlast | clocks << 8);
+        }
       }
       if (*inputs[k].tvalid && *inputs[k].tready) {
-        taken[k]++;
+        inputs[k].at = (inputs[k].at + inputs[k].words) % WORDS;
+        taken[k] += inputs[k].at == 0;
         held[k] = false;
       }
     }
@@ -179,7 +221,7 @@ static void run(uint32_t limit, uint32_t gaps, uint32_t stalls) {
     if (top->irq) break;
   }
   const uint32_t head[2] = {clocks, static_cast<uint32_t>(top->irq) | (busy() ? 2u : 0u)};
-  uint32_t sizes[STREAMS];
+  uint32_t sizes[MESSAGE_STREAMS] = {0, 0, 0, 0};
   answer(head, sizeof head);
   answer(taken, sizeof taken);
   for (int k = 0; k < STREAMS; k++) sizes[k] = sent[k].size() / BEAT_WORDS;

@@ -4,8 +4,8 @@
 //             cycles                         ends when
 //   load      ceil(B / 2)                    all bodies are taken; with world inertia B cycles
 //   setup     SETUP                          the finder has found the first collision
-//   pass      2 C - 1                        the last collision is issued; with the filling of a queue
-//   drain     fill + 1                       its write-back can be read
+//   pass      slots x INTERVAL - (INTERVAL - 1)   the last issue; with the filling of a queue
+//   drain     fill + INTERVAL - 1            its write-back can be read
 //   enter     B                              all bodies are in the integration
 //   leave     FINISH                         all results have left
 //   settle    SETTLE                         the sums of the streams are complete
@@ -14,6 +14,8 @@
 `default_nettype none
 
 module pgs_step_sequence #(
+  parameter integer INTERVAL      = 2,  // cycles of a slot
+  parameter integer SETUP         = 10, // whole slots
   parameter integer CONTACT_FILL  = 374,
   parameter integer FRICTION_FILL = 314,
   parameter integer FINISH        = 250
@@ -22,7 +24,7 @@ module pgs_step_sequence #(
   input  wire        reset,
   input  wire        start,
   input  wire        error,
-  input  wire [19:0] collisions,
+  input  wire [19:0] collisions,        // or pairs of them, where two enter together
   input  wire [8:0]  contact_passes,    // with the warm one; 0 without collisions
   input  wire [8:0]  friction_passes,
   input  wire        warm_start,        // the first pass of each kind is a warm one
@@ -39,8 +41,7 @@ module pgs_step_sequence #(
 
   output reg         busy,
   output reg         done,              // one cycle, at the end of a step or with its error
-  output reg         phase,             // of the pipelines: 0 in the cycles of an issue
-  output reg         slot_begins,       // ~phase, in a register of its own
+  output reg  [INTERVAL-1:0] phases,    // bit k: cycle k of a slot; cycle 0 is that of an issue
   output wire        loading,
   output reg         finding,
   output reg         passing,
@@ -61,10 +62,12 @@ module pgs_step_sequence #(
   output wire [31:0] work_cycles,       // saturates; counted a cycle later
   output wire [31:0] wait_cycles        // saturates; counted a cycle later
 );
-  localparam [3:0] SETUP = 4'd10;
   localparam [3:0] FIND  = 4'd4;        // cycle of the setup from which on the finder runs
 
   localparam [2:0] SETTLE = 3'd3;
+
+  localparam integer CONTACT_DRAIN  = CONTACT_FILL + INTERVAL - 2;
+  localparam integer FRICTION_DRAIN = FRICTION_FILL + INTERVAL - 2;
 
   localparam IDLE    = 3'd0;
   localparam LOAD    = 3'd1;
@@ -87,13 +90,14 @@ module pgs_step_sequence #(
   reg [9:0]  leave;
   reg        leave_over;
   reg [2:0]  settle;
-  reg        lost, lost_to_stream;      // the second cycle of a slot that was lost
+  reg [1:0]  lost_left;                 // further cycles of a slot that was lost
+  reg        lost_to_stream;
 
   assign loading     = state == LOAD;
   assign draining    = state == DRAIN;
   assign integrating = state == ENTER | state == LEAVE;
 
-  wire setup_ends = state == PREPARE & (setup == SETUP - 4'd1);
+  wire setup_ends = state == PREPARE & (setup == SETUP[3:0] - 4'd1);
   wire drain_ends = state == DRAIN & drain_one;
   assign begin_pass = setup_ends | drain_ends;
 
@@ -110,9 +114,8 @@ module pgs_step_sequence #(
     no_frictions  <= friction_passes == 9'd0;
     one_friction  <= friction_passes == 9'd1;
     one_collision <= collisions == 20'd1;
-    // The phase runs from the setup on, so that every step has the same.
-    phase       <= (state == IDLE | state == LOAD) ? 1'b0 : ~phase;
-    slot_begins <= (state == IDLE | state == LOAD) ? 1'b1 : phase;
+    // The slots run from the setup on, so that every step has the same.
+    phases <= (state == IDLE | state == LOAD) ? {{(INTERVAL-1){1'b0}}, 1'b1} : {phases[INTERVAL-2:0], phases[INTERVAL-1]};
     if (reset) begin
       state   <= IDLE;
       busy    <= 1'b0;
@@ -160,7 +163,7 @@ module pgs_step_sequence #(
           last_issue     <= left == 20'd2;
           pass_is_last <= friction ? frictions_left == 9'd1
                         : (contacts_left == 9'd1) & (frictions_left == 9'd0);
-          drain        <= friction ? FRICTION_FILL[9:0] : CONTACT_FILL[9:0];
+          drain        <= friction ? FRICTION_DRAIN[9:0] : CONTACT_DRAIN[9:0];
           drain_one    <= 1'b0;
           if (last_issue) begin
             state   <= DRAIN;
@@ -214,17 +217,21 @@ module pgs_step_sequence #(
                  | (state == ENTER & ~enters & ~enter_finished)
                  | (state == LEAVE & leave_over & ~results_finished);
   wire waiting   = lost_here & ~stalls;
-  wire lost_slot = stalls | waits;
+  localparam integer FURTHER = INTERVAL - 1;
   reg        works, loses;
   reg [31:0] worked, waited;
   reg        worked_full, waited_full;
   assign work_cycles = worked | {32{worked_full}};
   assign wait_cycles = waited | {32{waited_full}};
   always @(posedge clk) begin
-    lost           <= lost_slot;
-    lost_to_stream <= waits;
-    works          <= busy & ~lost_here & ~lost;
-    loses          <= busy & (waiting | lost_to_stream);
+    if (stalls | waits) begin
+      lost_left      <= FURTHER[1:0];
+      lost_to_stream <= waits;
+    end else if (lost_left != 2'd0) begin
+      lost_left <= lost_left - 2'd1;
+    end
+    works <= busy & ~lost_here & (lost_left == 2'd0);
+    loses <= busy & (waiting | (lost_to_stream & (lost_left != 2'd0)));
     {worked_full, worked} <= {worked_full, 32'd0} | ({1'b0, worked} + {32'd0, works});
     {waited_full, waited} <= {waited_full, 32'd0} | ({1'b0, waited} + {32'd0, loses});
     if (busy) cycles <= cycles + 64'd1;
@@ -233,8 +240,7 @@ module pgs_step_sequence #(
       {worked_full, worked} <= 33'd0;
       {waited_full, waited} <= 33'd0;
       {works, loses}        <= 2'b00;
-      lost                  <= 1'b0;
-      lost_to_stream        <= 1'b0;
+      lost_left             <= 2'd0;
     end
   end
 endmodule

@@ -10,12 +10,14 @@
 `default_nettype none
 
 module pgs_sender #(
-  parameter integer ADDRESS = 10       // the FIFO holds 2^ADDRESS rows
+  parameter integer WIDTH   = 128,     // of the stream; with 64 bits a row is two transfers, low bits first
+  parameter integer ADDRESS = 10,      // the FIFO holds 2^ADDRESS rows
+  parameter integer SPARE   = 3        // rows that may enter before `has_room` tells of them
 ) (
   input  wire         clk,
   input  wire         clear,    // reset, or a step begins
   input  wire         stop,     // the step has an error: no more rows are offered
-  input  wire [19:0]  bodies,
+  input  wire [19:0]  rows_of_results,
 
   input  wire         enters,   // a body enters the integration, or a collision its last pass
   output reg          has_room, // one may enter in the next cycle
@@ -23,7 +25,7 @@ module pgs_sender #(
   input  wire         result,   // the row is one of a result
   input  wire [127:0] row,
 
-  output wire [127:0] tdata,
+  output wire [WIDTH-1:0] tdata,
   output wire         tlast,
   output wire         tvalid,
   input  wire         tready,
@@ -40,26 +42,43 @@ module pgs_sender #(
   reg              last_left;        // the beat in the cycle before was the last one
   reg              stopped;          // nothing is offered until the next step
   wire             there;            // a row in the FIFO
+  wire             last;             // the oldest one is the last one
+  wire [127:0]     head;
   assign           tvalid = there & ~stopped;
-  wire             leaves = tvalid & tready;
+  wire             leaves;           // the last transfer of a row
+  generate
+    if (WIDTH == 128) begin : g_whole
+      assign tdata  = head;
+      assign tlast  = last;
+      assign leaves = tvalid & tready;
+    end else begin : g_halves
+      reg second;
+      always @(posedge clk) begin
+        if (clear) second <= 1'b0;
+        else if (tvalid & tready) second <= ~second;
+      end
+      assign tdata  = second ? head[127 -: WIDTH] : head[WIDTH-1:0];
+      assign tlast  = last & second;
+      assign leaves = tvalid & tready & second;
+    end
+  endgenerate
 
   always @(posedge clk) begin
-    one_row <= bodies == 20'd1;
+    one_row <= rows_of_results == 20'd1;
     taken   <= enters & ~clear;
     given   <= leaves & ~clear;
-    last_left <= leaves & tlast & ~clear;
+    last_left <= leaves & last & ~clear;
     if (clear) begin
       credits      <= CREDITS;
       has_room     <= 1'b1;
-      rows_left    <= bodies;
+      rows_left    <= rows_of_results;
       row_is_last  <= one_row;
       finished     <= 1'b0;
       stopped      <= 1'b0;
     end else begin
       if (taken & ~given) credits <= credits - 1'b1;
       if (given & ~taken) credits <= credits + 1'b1;
-      // Two bodies may enter before this flag tells of them.
-      has_room <= credits > 3;
+      has_room <= credits > SPARE[ADDRESS:0];
       if (push & result) begin
         rows_left   <= rows_left - 20'd1;
         row_is_last <= rows_left == 20'd2;
@@ -71,7 +90,7 @@ module pgs_sender #(
 
   pgs_block_fifo #(.WIDTH(129), .ADDRESS(ADDRESS)) rows (
     .clk(clk), .clear(clear), .push(push), .in({row_is_last & result, row}), .pop(leaves),
-    .head({tlast, tdata}), .some(there)
+    .head({last, head}), .some(there)
   );
 
   pgs_word_sum words (

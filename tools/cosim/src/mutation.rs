@@ -312,8 +312,8 @@ pub const MUTATIONS: &[Mutation] = &[
         name: "one body with world inertia has the beats of an isotropic one",
         inertia: Inertia::World,
         file: "pgs_receiver.v",
-        right: "& (of == VELOCITIES)) ? one_body\n",
-        wrong: "& (of == VELOCITIES)) ? body_beats_one\n",
+        right: "(of == VELOCITIES) ? velocities_one :",
+        wrong: "(of == VELOCITIES) ? poses_one :",
     },
     Mutation {
         name: "the load with world inertia does not wait for the last row",

@@ -1,7 +1,7 @@
 //! One build of the accelerator: its parameters, and the schedules that follow from them.
 
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::{Depth, FLOAT, Inertia, Variant};
+use pgs_interface::profile::{Depth, FLOAT, HALF, Inertia, Profile, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 use crate::equations;
@@ -11,6 +11,8 @@ use crate::schedule::Schedule;
 /// The choices of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parameters {
+    /// The profile that the build is of.
+    pub profile: &'static Profile,
     /// Bodies that the memories hold.
     pub bodies: u32,
     /// Collisions that the memories hold.
@@ -41,30 +43,37 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self::with(Inertia::Isotropic)
+        Self::of(&FLOAT, Inertia::Isotropic)
     }
 }
 
 impl Parameters {
-    /// The default choices with that form of inertia. World inertia takes more than twice the
-    /// memory a body.
+    /// The default choices of `float` with that form of inertia.
     #[must_use]
     pub fn with(inertia: Inertia) -> Self {
+        Self::of(&FLOAT, inertia)
+    }
+
+    /// The default choices of a profile with that form of inertia. World inertia takes more than
+    /// twice the memory a body.
+    #[must_use]
+    pub fn of(profile: &'static Profile, inertia: Inertia) -> Self {
         let (bodies, collisions) = match inertia {
             Inertia::Isotropic => (40_960, 131_072),
             Inertia::World => (16_384, 65_536),
         };
         Self {
+            profile,
             bodies,
             collisions,
             inertia,
             interlocked: true,
-            queue: FLOAT.queue.unwrap_or(0),
+            queue: profile.queue.unwrap_or(0),
             address_stages: 2,
             output_stages: 3,
             smallest_normal: true,
             memory: Fence::default(),
-            clock_khz: FLOAT.clock_khz,
+            clock_khz: profile.clock_khz,
         }
     }
 }
@@ -75,16 +84,18 @@ pub enum BuildError {
     /// A collision would take the velocities of the one before it.
     #[error(
         "{address_stages} registers in front of the memories and {output_stages} behind them give \
-         a read latency of {latency} cycles, expected an even number: a port reads in one cycle of \
-         a slot and writes in the other; add a register on either side"
+         a read latency of {latency} cycles, expected a multiple of {interval}: a port reads in \
+         one cycle of a slot and writes in the others; add registers on either side"
     )]
-    OddReadLatency {
+    ReadLatency {
         /// Registers in front of the memories.
         address_stages: u32,
         /// Registers behind them.
         output_stages: u32,
         /// Cycles from an address to the word.
         latency: u32,
+        /// Cycles of a slot.
+        interval: u32,
     },
     /// A queue waits for hazards to be over, and an unchecked build does not know of them.
     #[error(
@@ -95,13 +106,35 @@ pub enum BuildError {
         /// The requested depth.
         queue: u32,
     },
+    /// More bodies than an index of the profile's words can name.
+    #[error("{bodies} bodies, expected at most {most}")]
+    Bodies {
+        /// The requested number.
+        bodies: u32,
+        /// The largest number.
+        most: u32,
+    },
+    /// Collisions leave a queue one by one.
+    #[error("an issue queue of {queue} collisions in profile {profile}, expected none")]
+    NoQueue {
+        /// The requested depth.
+        queue: u32,
+        /// The name of the profile.
+        profile: &'static str,
+    },
+    /// The profile is not built with that form of inertia.
+    #[error("profile {profile} with world inertia, expected isotropic inertia")]
+    NoInertia {
+        /// The name of the profile.
+        profile: &'static str,
+    },
 }
 
 impl Parameters {
     /// The variant of the profile that the build is.
     #[must_use]
     pub fn variant(&self) -> Variant {
-        Variant { inertia: self.inertia, ..FLOAT.default_variant() }
+        Variant { inertia: self.inertia, ..self.profile.default_variant() }
     }
 
     /// Refuses parameters that contradict the hand-written modules.
@@ -111,9 +144,22 @@ impl Parameters {
     /// Every [`BuildError`].
     pub fn check(&self) -> Result<(), BuildError> {
         let latency = self.read_latency();
-        let Self { address_stages, output_stages, queue, .. } = *self;
-        if !latency.is_multiple_of(FLOAT.initiation_interval) {
-            return Err(BuildError::OddReadLatency { address_stages, output_stages, latency });
+        let Self { profile, address_stages, output_stages, queue, .. } = *self;
+        let interval = profile.initiation_interval;
+        if !latency.is_multiple_of(interval) {
+            let wrong =
+                BuildError::ReadLatency { address_stages, output_stages, latency, interval };
+            return Err(wrong);
+        }
+        if !profile.inertias().contains(&self.inertia) {
+            return Err(BuildError::NoInertia { profile: profile.name });
+        }
+        let most = self.variant().body_capacity();
+        if self.bodies > most {
+            return Err(BuildError::Bodies { bodies: self.bodies, most });
+        }
+        if queue > 0 && !profile.has_queue() {
+            return Err(BuildError::NoQueue { queue, profile: profile.name });
         }
         if queue > 0 && !self.interlocked {
             return Err(BuildError::UncheckedQueue { queue });
@@ -155,41 +201,61 @@ pub struct Module<'a> {
     pub pipelines: Vec<&'a Pipeline>,
 }
 
-/// A build of profile `float`.
+/// A build of a profile.
 #[derive(Debug)]
 pub struct Design {
     /// The choices.
     pub parameters: Parameters,
-    /// Contact passes, a collision every initiation interval of the profile.
+    /// Contact passes, a collision every initiation interval of the profile. Where two collisions
+    /// issue together, each has a pipeline of its own.
     pub contact: Pipeline,
     /// Friction passes, likewise.
     pub friction: Pipeline,
-    /// Integration, a body a cycle: as fast as the streams take results.
+    /// Integration, as fast as the streams take results: in `float` a body a cycle, in `half` five
+    /// bodies in four cycles, for which there are five pipelines.
     pub integration: Pipeline,
 }
 
-/// Cycles between the issue of a collision and cycle 0 of its pipeline, and between the results and
-/// the first issue that sees them: record registers, write registers.
-const AROUND_A_PASS: u32 = 8;
+/// Cycles of the control around the pipelines.
+struct Around {
+    /// Between the issue of a collision and cycle 0 of its pipeline, and between the results and
+    /// the first issue that sees them: record registers, write registers.
+    pass: u32,
+    /// Of a step in which nothing is loaded, passed or integrated, beside the way of the last body
+    /// through the integration.
+    step: u32,
+    /// From a body to the next in one pipeline of the integration.
+    interval: u32,
+}
 
-/// Cycles of a step in which nothing is loaded, passed or integrated, beside the way of the last
-/// body through the integration: set-up in front of the first pass (10), the end of the load (2),
-/// the entry into the integration (1), the result FIFOs and their end (5), the sums and the end
-/// (3).
-const AROUND_A_STEP: u32 = 21;
+/// Around a step: set-up in front of the first pass (10), the end of the load (2), the entry into
+/// the integration (1), the result FIFOs and their end (5), the sums and the end (3).
+const AROUND_FLOAT: Around = Around { pass: 8, step: 21, interval: 1 };
+const AROUND_HALF: Around = Around { pass: 9, step: 25, interval: 4 };
+
+impl Parameters {
+    fn around(&self) -> &'static Around {
+        if self.profile.id == HALF.id { &AROUND_HALF } else { &AROUND_FLOAT }
+    }
+}
 
 impl Design {
     /// Schedules the three pipelines.
     #[must_use]
     pub fn new(parameters: Parameters) -> Self {
-        let interval = FLOAT.initiation_interval;
-        let contact = equations::contact(CONTACT_POINTS, parameters.inertia);
-        let friction = equations::friction(parameters.inertia);
+        let interval = parameters.profile.initiation_interval;
+        let precision = parameters.profile.numbers.updates;
+        let contact = equations::contact(precision, CONTACT_POINTS, parameters.inertia);
+        let friction = equations::friction(precision, parameters.inertia);
         Self {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
             friction: Pipeline::new("friction", friction, interval),
-            integration: Pipeline::new("integration", equations::integration(), 1),
+            integration: Pipeline::new(
+                "integration",
+                equations::integration(precision),
+                parameters.around().interval,
+            ),
         }
     }
 
@@ -199,10 +265,18 @@ impl Design {
         [&self.contact, &self.friction, &self.integration]
     }
 
-    /// The modules that the pipelines are.
+    /// The modules that the pipelines are: one, unless the passes and the integration differ in
+    /// the number of their pipelines.
     #[must_use]
     pub fn modules(&self) -> Vec<Module<'_>> {
-        vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }]
+        let [passes @ .., integration] = self.pipelines();
+        if integration.schedule.interval == 1 {
+            return vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }];
+        }
+        vec![
+            Module { name: "solver", pipelines: passes.to_vec() },
+            Module { name: "integration", pipelines: vec![integration] },
+        ]
     }
 
     /// Fill and hazard window of a pipeline, if it is one of the passes.
@@ -221,7 +295,7 @@ impl Design {
         let schedule = &pass.schedule;
         let after_velocities = unsigned(schedule.depth - schedule.velocities_at);
         Depth {
-            fill: unsigned(schedule.depth) + AROUND_A_PASS,
+            fill: unsigned(schedule.depth) + self.parameters.around().pass,
             window: after_velocities + self.parameters.read_latency() + unsigned(schedule.interval),
         }
     }
@@ -233,14 +307,16 @@ impl Design {
     #[must_use]
     pub fn window_slots(&self) -> u32 {
         let windows = [&self.contact, &self.friction].map(|pass| self.depth(pass).window);
-        windows[0].max(windows[1]).div_ceil(FLOAT.initiation_interval)
+        windows[0].max(windows[1]).div_ceil(self.parameters.profile.initiation_interval)
     }
 
     /// Cycles that every step takes beside load, passes and one cycle a body: the way of the last
     /// body through the integration, and the control around the step.
     #[must_use]
     pub fn step_fill(&self) -> u32 {
-        unsigned(self.integration.schedule.depth) + self.parameters.read_latency() + AROUND_A_STEP
+        unsigned(self.integration.schedule.depth)
+            + self.parameters.read_latency()
+            + self.parameters.around().step
     }
 }
 
@@ -253,6 +329,7 @@ fn unsigned(cycle: i32) -> u32 {
 mod tests {
     use super::*;
     use crate::graph::{Kind, Operation, Source};
+    use pgs_interface::number::Precision;
 
     const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
 
@@ -334,8 +411,9 @@ mod tests {
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
         // The second quotient, with registers before and behind the divider, and two products of it.
-        let quotient = Operation::Divide.operator().latency + 4;
-        let half_angle_limit = quotient + 2 * (Operation::Multiply.operator().latency + 1);
+        let latency = |operation: Operation| operation.operator(Precision::F32).latency;
+        let quotient = latency(Operation::Divide) + 4;
+        let half_angle_limit = quotient + 2 * (latency(Operation::Multiply) + 1);
         // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];

@@ -10,6 +10,7 @@ pub mod emit;
 pub mod ending;
 pub mod equations;
 pub mod graph;
+pub mod number;
 pub mod operators;
 pub mod pool;
 pub mod schedule;

@@ -3,7 +3,10 @@
 //! A latency is the number of register stages of the module in `bitstream-model/rtl/operators`; the
 //! check of the operators measures it.
 
+use pgs_interface::number::Precision;
+
 use crate::graph::Operation;
+use crate::number;
 
 /// An operator of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +21,12 @@ pub struct Operator {
     pub arithmetic: bool,
     /// Whether the module has the parameter `SMALLEST_NORMAL`.
     pub smallest_normal: bool,
+    /// The value of the module's parameter `WIDTH`, where it is not the default.
+    pub set_width: Option<u32>,
 }
+
+/// Cycles of the conversion from binary32 to binary16, which no pipeline needs.
+pub const FLOAT_TO_HALF: u32 = 3;
 
 /// All operations, in the order of the tables.
 pub const ALL: [Operation; 14] = [
@@ -41,26 +49,30 @@ pub const ALL: [Operation; 14] = [
 impl Operation {
     /// The operator that carries the operation out.
     #[must_use]
-    pub fn operator(self) -> Operator {
+    pub fn operator(self, precision: Precision) -> Operator {
         const AB: &[&str] = &["a", "b"];
         const ABC: &[&str] = &["condition", "a", "b", "c"];
-        let (module, ports, latency, arithmetic): (_, &[&str], _, _) = match self {
-            Self::Add => ("fadd", AB, 7, true),
-            Self::Multiply => ("fmul", AB, 5, true),
-            Self::Divide => ("fdiv", AB, 29, true),
-            Self::SquareRoot => ("fsqrt", &["a"], 27, true),
-            Self::SineCosine => ("fsincos", &["a"], 26, true),
-            Self::Maximum => ("fmax", AB, 1, false),
-            Self::Minimum => ("fmin", AB, 1, false),
-            Self::Less => ("fless", AB, 1, false),
-            Self::Select => ("fselect", &["condition", "a", "b"], 1, false),
-            Self::NonZero => ("fnonzero", &["flag", "a"], 1, false),
-            Self::Or => ("flogic_or", AB, 1, false),
-            Self::And => ("flogic_and", AB, 1, false),
-            Self::MaximumOr => ("fmax_or", ABC, 1, false),
-            Self::MinimumOr => ("fmin_or", ABC, 1, false),
+        let half = precision == Precision::Binary16;
+        let of = |single, in_half| if half { in_half } else { single };
+        let ((module, latency), ports, arithmetic): (_, &[&str], _) = match self {
+            Self::Add => (of(("fadd", 7), ("hadd", 5)), AB, true),
+            Self::Multiply => (of(("fmul", 5), ("hmul", 4)), AB, true),
+            Self::Divide => (of(("fdiv", 29), ("hdiv", 10)), AB, true),
+            Self::SquareRoot => (of(("fsqrt", 27), ("hsqrt", 8)), &["a"], true),
+            Self::SineCosine => (of(("fsincos", 26), ("hsincos", 12)), &["a"], true),
+            Self::Maximum => (("fmax", 1), AB, false),
+            Self::Minimum => (("fmin", 1), AB, false),
+            Self::Less => (("fless", 1), AB, false),
+            Self::Select => (("fselect", 1), &["condition", "a", "b"], false),
+            Self::NonZero => (("fnonzero", 1), &["flag", "a"], false),
+            Self::Or => (("flogic_or", 1), AB, false),
+            Self::And => (("flogic_and", 1), AB, false),
+            Self::MaximumOr => (("fmax_or", 1), ABC, false),
+            Self::MinimumOr => (("fmin_or", 1), ABC, false),
         };
-        let smallest_normal = matches!(self, Self::Multiply | Self::Divide);
-        Operator { module, ports, latency, arithmetic, smallest_normal }
+        let smallest_normal = !half && matches!(self, Self::Multiply | Self::Divide);
+        let has_width = !arithmetic && !matches!(self, Self::Or | Self::And);
+        let set_width = (half && has_width).then(|| number::width(precision));
+        Operator { module, ports, latency, arithmetic, smallest_normal, set_width }
     }
 }

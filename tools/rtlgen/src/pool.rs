@@ -5,6 +5,8 @@
 //! their operands takes less than a second unit. The schedules stay as they are: no cycle and no
 //! window depends on the pool.
 
+use pgs_interface::number::Precision;
+
 use crate::design::Pipeline;
 use crate::graph::{NodeId, Operation};
 
@@ -31,10 +33,10 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Its name in the Verilog.
+    /// Its name in the Verilog, in numbers of a precision.
     #[must_use]
-    pub fn name(&self) -> String {
-        format!("{}_{}", self.operation.operator().module, self.number)
+    pub fn name(&self, precision: Precision) -> String {
+        format!("{}_{}", self.operation.operator(precision).module, self.number)
     }
 
     /// The operations of a pipeline.
@@ -43,20 +45,24 @@ impl Unit {
     }
 }
 
-/// The most operands among which a port of a unit chooses: four take a LUT a bit, and one level of
-/// logic.
-const CHOICES: usize = 4;
+/// The most operands among which a port of a unit chooses: as many as two passes have phases. In
+/// `float` these are four, a LUT a bit and one level of logic; in `half` six, two LUTs a bit.
+fn choices(pipelines: &[&Pipeline]) -> usize {
+    let phases = pipelines.iter().map(|pipeline| pipeline.schedule.interval).max();
+    2 * usize::try_from(phases.unwrap_or(1)).unwrap_or(1)
+}
 
 /// The units of some pipelines: a comparison or a selection is as small as the choice between its
 /// operands, so that each pipeline has its own.
 #[must_use]
 pub fn units(pipelines: &[&Pipeline]) -> Vec<Unit> {
+    let choices = choices(pipelines);
     let mut pool: Vec<Unit> = Vec::new();
-    for (pipeline, Pipeline { schedule, .. }) in pipelines.iter().enumerate() {
+    for (pipeline, Pipeline { graph, schedule, .. }) in pipelines.iter().enumerate() {
         let own = |unit: &Unit| unit.of(pipeline).next().is_some();
         for scheduled in &schedule.units {
             let operation = scheduled.operation;
-            let shares = operation.operator().arithmetic;
+            let shares = operation.operator(graph.precision()).arithmetic;
             let uses = scheduled.phases.iter().enumerate();
             let uses: Vec<Use> = uses
                 .filter_map(|(phase, node)| node.map(|node| Use { pipeline, phase, node }))
@@ -66,7 +72,7 @@ pub fn units(pipelines: &[&Pipeline]) -> Vec<Unit> {
             let free = pool
                 .iter_mut()
                 .filter(|unit| shares && unit.operation == operation && !own(unit))
-                .filter(|unit| unit.uses.len() + uses.len() <= CHOICES)
+                .filter(|unit| unit.uses.len() + uses.len() <= choices)
                 .min_by_key(|unit| unit.uses.len());
             match free {
                 Some(unit) => unit.uses.extend(uses),
@@ -96,7 +102,7 @@ mod tests {
                     let Pipeline { graph, schedule, .. } = pipelines[pipeline];
                     assert_eq!(graph.node(node).kind.operation(), Some(unit.operation));
                     assert_eq!(schedule.phase(schedule.starts[node.index()]), phase);
-                    assert!(!taken.contains(&(pipeline, phase)), "{}", unit.name());
+                    assert!(!taken.contains(&(pipeline, phase)), "{unit:?}");
                     taken.push((pipeline, phase));
                     carried_out.push((pipeline, node));
                 }
@@ -120,6 +126,6 @@ mod tests {
         let adders = pool.iter().filter(|unit| unit.operation == Operation::Add).count();
         let each = design.pipelines().map(|one| one.schedule.usage()[&Operation::Add].units);
         assert_eq!(Some(&adders), each.iter().max(), "{each:?}");
-        assert!(pool.iter().all(|unit| unit.uses.len() <= CHOICES));
+        assert!(pool.iter().all(|unit| unit.uses.len() <= 4));
     }
 }

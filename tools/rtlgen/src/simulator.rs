@@ -5,6 +5,8 @@ use std::fs;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
+use pgs_interface::address_map::DMA_COUNT_MAX;
+
 use crate::design::Design;
 use crate::emit::{self, File};
 use crate::verify::{Error, verilator};
@@ -64,6 +66,13 @@ pub fn build(design: &Design, folder: &Path, waveform: Waveform) -> Result<PathB
     build_files(&emit::files(design), folder, waveform)
 }
 
+/// The streams each way that the top module of these files has.
+fn streams(files: &[File]) -> usize {
+    let is_top = |file: &&File| file.name.strip_suffix(".v") == Some(emit::TOP);
+    let top = files.iter().find(is_top).map_or("", |file| file.text.as_str());
+    (0..DMA_COUNT_MAX).take_while(|k| top.contains(&format!("s{k}_axis_tdata"))).count()
+}
+
 /// Builds the simulator from the files of a design, which may have been changed.
 ///
 /// # Errors
@@ -83,7 +92,8 @@ pub fn build_files(files: &[File], folder: &Path, waveform: Waveform) -> Result<
     names.push("main.cpp".into());
     // The simulation is hardly faster with -O2, and the build takes four times as long.
     let waveform = waveform == Waveform::Vcd;
-    let build = verilator::Build { top: emit::TOP, flags: "-O1", files: &names, waveform };
+    let flags = format!("-O1 -DSTREAMS={}", streams(files));
+    let build = verilator::Build { top: emit::TOP, flags: &flags, files: &names, waveform };
     verilator::build(place, &build)?;
     let program = folder.join(PROGRAM);
     fs::copy(place.join("obj").join(format!("V{}", emit::TOP)), &program)

@@ -1,5 +1,8 @@
 //! The Verilog of the repository, as part of the program.
 
+use pgs_interface::number::Precision;
+use pgs_interface::profile::{self, Profile};
+
 /// A file of Verilog.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
@@ -20,23 +23,62 @@ macro_rules! sources {
     };
 }
 
-/// The operators, each after the modules that it is made of.
-pub const OPERATORS: &[Source<'_>] = sources! {
-    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos", "fbelow", "fmax", "fmin",
-        "fmax_or", "fmin_or", "fless", "fselect", "fnonzero", "flogic_or", "flogic_and";
+/// The arithmetic operators of binary32, each after the modules that it is made of.
+const BINARY32: &[Source<'_>] = sources! {
+    "operators/": "fadd", "fmul", "fdiv", "fsqrt", "horner", "fsincos";
 };
 
-/// All other hand-written modules, each after the modules that it is made of.
-pub const AROUND: &[Source<'_>] = sources! {
-    "memory/": "pipeline_register", "timed_flag", "delay", "fifo", "block_fifo", "ram_tile", "ram_lane",
-        "true_dual_port";
-    "stream/": "word_sum", "receiver", "sender";
-    "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator", "step_sequence";
-    "operators/": "half_to_float";
-    "pass/": "finder", "issue", "queue_records", "queue_hazard", "queue_first", "queue",
-        "issue_numbers", "impulses", "impulse_sum";
-    "": "core", "control_block", "top";
+/// The ones of binary16, and the conversion to it.
+const BINARY16: &[Source<'_>] = sources! {
+    "operators/": "hnormal", "hround", "hadd", "hmul", "hdiv", "hsqrt", "hsincos", "float_to_half";
 };
+
+/// Comparisons and selections, which have the width as a parameter.
+const OF_BOTH: &[Source<'_>] = sources! {
+    "operators/": "fbelow", "fmax", "fmin", "fmax_or", "fmin_or", "fless", "fselect", "fnonzero",
+        "flogic_or", "flogic_and";
+};
+
+/// The operators of a precision.
+#[must_use]
+pub fn operators(precision: Precision) -> Vec<Source<'static>> {
+    let arithmetic = match precision {
+        Precision::F32 => BINARY32,
+        Precision::Binary16 => BINARY16,
+    };
+    [arithmetic, OF_BOTH].concat()
+}
+
+/// Modules of every profile.
+const COMMON: &[Source<'_>] = sources! {
+    "memory/": "pipeline_register", "delay", "fifo", "block_fifo", "ram_tile", "ram_lane", "true_dual_port";
+    "stream/": "word_sum", "receiver", "sender";
+    "operators/": "half_to_float";
+    "step/": "step_sequence";
+    "pass/": "impulse_sum";
+    "": "control_block";
+};
+
+/// All others of `float`, each after the modules that it is made of.
+const FLOAT: &[Source<'_>] = sources! {
+    "memory/": "timed_flag";
+    "step/": "constants", "loader", "body_shapes", "world_bodies", "bodies", "integrator";
+    "pass/": "finder", "issue", "queue_records", "queue_hazard", "queue_first", "queue", "issue_numbers", "impulses";
+    "": "core", "top";
+};
+
+/// All others of `half`.
+const HALF: &[Source<'_>] = sources! {
+    "memory/": "two_banks";
+    "half/": "half_packets", "half_constants", "half_loader", "half_shapes", "half_finder", "half_issue", "half_impulses",
+        "half_integrator", "half_results", "half_core", "top";
+};
+
+/// The hand-written modules of a profile.
+pub fn of(profile: &Profile) -> impl Iterator<Item = Source<'static>> {
+    let own = if profile.id == profile::HALF.id { HALF } else { FLOAT };
+    operators(profile.numbers.updates).into_iter().chain([COMMON, own].concat())
+}
 
 #[cfg(test)]
 mod tests {
@@ -44,6 +86,10 @@ mod tests {
     use std::{fs, io};
 
     use super::*;
+
+    fn all() -> impl Iterator<Item = &'static Source<'static>> {
+        [BINARY32, BINARY16, OF_BOTH, COMMON, FLOAT, HALF].into_iter().flatten()
+    }
 
     fn verilog_below(folder: &Path, files: &mut Vec<String>) -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
@@ -62,7 +108,7 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bitstream-model/rtl");
         let mut files = Vec::new();
         verilog_below(&folder, &mut files)?;
-        let mut listed: Vec<_> = OPERATORS.iter().chain(AROUND).map(|source| source.file).collect();
+        let mut listed: Vec<_> = all().map(|source| source.file).collect();
         files.sort();
         listed.sort_unstable();
         assert_eq!(files, listed);
@@ -71,7 +117,7 @@ mod tests {
 
     #[test]
     fn every_file_holds_the_module_of_its_name() {
-        for Source { file, text } in OPERATORS.iter().chain(AROUND) {
+        for Source { file, text } in all() {
             let module = format!("\nmodule {} ", file.trim_end_matches(".v"));
             assert_eq!(text.matches("\nmodule ").count(), 1, "{file}");
             assert!(text.contains(&module), "{file}");

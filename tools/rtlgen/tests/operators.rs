@@ -2,31 +2,51 @@
 //! if Verilator is installed.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
-use rtlgen::sources::{OPERATORS, Source};
-use rtlgen::verify::Error;
+use pgs_interface::number::Precision;
+use rtlgen::sources::{self, Source};
 use rtlgen::verify::operators::{self, Tally, verify};
 use rtlgen::verify::simulation::Simulator;
 use rtlgen::verify::vectors::Vectors;
+use rtlgen::verify::{Error, half};
 
 const VECTORS: u64 = 20_000;
+/// Every operand of the operators of binary16 with one, and of the others each stratum 64 times.
+const HALF_VECTORS: u64 = 1 << 18;
 
 /// The wrong results by operator, or nothing if a tool is missing.
-fn tallies(sources: &[Source<'_>]) -> Result<Vec<Tally>, Error> {
-    match Simulator::build_from(sources) {
+fn tallies(precision: Precision, sources: &[Source<'_>]) -> Result<Vec<Tally>, Error> {
+    let simulator = match Simulator::build_from(precision, sources) {
         Err(missing @ Error::Missing { .. }) => {
             eprintln!("skipped: {missing}");
-            Ok(Vec::new())
+            return Ok(Vec::new());
         }
-        simulator => verify(&simulator?, &operators::OPERATORS, Vectors::new(1), VECTORS, |_| ()),
+        simulator => simulator?,
+    };
+    match precision {
+        Precision::F32 => {
+            verify(&simulator, &operators::OPERATORS, Vectors::new(1), VECTORS, |_| ())
+        }
+        Precision::Binary16 => {
+            verify(&simulator, &half::OPERATORS, half::Vectors::new(1), HALF_VECTORS, |_| ())
+        }
     }
+}
+
+fn assert_right(precision: Precision) -> Result<(), Error> {
+    for Tally { operator, wrong, first } in tallies(precision, &sources::operators(precision))? {
+        assert_eq!(wrong, 0, "{}: {first:x?}", operator.name);
+    }
+    Ok(())
 }
 
 #[test]
 fn no_result_is_wrong() -> Result<(), Error> {
-    for Tally { operator, wrong, first } in tallies(OPERATORS)? {
-        assert_eq!(wrong, 0, "{}: {first:x?}", operator.name);
-    }
-    Ok(())
+    assert_right(Precision::F32)
+}
+
+#[test]
+fn no_result_in_binary16_is_wrong() -> Result<(), Error> {
+    assert_right(Precision::Binary16)
 }
 
 /// A fault in an operator: the text that stands in its file once, and what it becomes.
@@ -68,14 +88,14 @@ const FAULTS: [Fault; 11] = [
         operator: "max",
         file: "pgs_fmax.v",
         correct: "y <= a_above_b ?",
-        wrong: "y <= (a_above_b | (&b[30:22])) ?",
+        wrong: "y <= (a_above_b | (&b[WIDTH-2:FRACTION-1])) ?",
     },
     // A subnormal operand becomes the result.
     Fault {
         operator: "min",
         file: "pgs_fmin.v",
-        correct: "b[22:0] & {23{|b[30:23]}}",
-        wrong: "b[22:0]",
+        correct: "b[FRACTION-1:0] & {FRACTION{b_stays}}",
+        wrong: "b[FRACTION-1:0]",
     },
     // A number is less than itself.
     Fault {
@@ -89,32 +109,94 @@ const FAULTS: [Fault; 11] = [
         operator: "select",
         file: "pgs_fselect.v",
         correct: "always @(posedge clk) begin\n    y <= condition ? a : b;",
-        wrong: "reg [31:0] late;\n\n  always @(posedge clk) begin\n    late <= condition ? a : b;\n\
+        wrong: "reg [WIDTH-1:0] late;\n\n  always @(posedge clk) begin\n    late <= condition ? a : b;\n\
                 y <= late;",
     },
     Fault { operator: "nonzero", file: "pgs_fnonzero.v", correct: "<= flag &", wrong: "<= flag |" },
     Fault { operator: "or", file: "pgs_flogic_or.v", correct: "a | b", wrong: "a ^ b" },
 ];
 
-#[test]
-fn a_fault_in_each_operator_is_found() -> Result<(), Error> {
-    let texts: Vec<(&str, String)> = OPERATORS
+/// The same in binary16, where the subnormal numbers are.
+const HALF_FAULTS: [Fault; 7] = [
+    // A difference is shifted beyond the lowest exponent.
+    Fault {
+        operator: "add",
+        file: "pgs_hadd.v",
+        correct: "lowest ? exponent_s3[3:0] :",
+        wrong: "1'b0 ? exponent_s3[3:0] :",
+    },
+    // A subnormal operand is not shifted to its leading one.
+    Fault {
+        operator: "mul",
+        file: "pgs_hmul.v",
+        correct: "wire [14:0] lower         = a_is_low ? a[14:0] : b[14:0];",
+        wrong: "wire [14:0] lower         = a[14:0];",
+    },
+    // The remainder is not looked at: a subnormal tie and a little more count as a tie.
+    Fault {
+        operator: "div",
+        file: "pgs_hdiv.v",
+        correct: ".sticky(|rest)",
+        wrong: ".sticky(1'b0)",
+    },
+    // The root of a subnormal number has the wrong exponent.
+    Fault {
+        operator: "sqrt",
+        file: "pgs_hsqrt.v",
+        correct: "+ 6'd13 - {2'd0, leading}",
+        wrong: "+ 6'd13",
+    },
+    // One argument alone is wrong: its cosine is rounded twice.
+    Fault {
+        operator: "sincos",
+        file: "pgs_hsincos.v",
+        correct: ".sticky(|cosine_s9[11:0])",
+        wrong: ".sticky(1'b1)",
+    },
+    // NaN is a number.
+    Fault {
+        operator: "less",
+        file: "pgs_fbelow.v",
+        correct: "~(both_zero | a_is_nan | b_is_nan)",
+        wrong: "~(both_zero | a_is_nan)",
+    },
+    // A subnormal number counts as zero.
+    Fault {
+        operator: "nonzero",
+        file: "pgs_fnonzero.v",
+        correct: "(WIDTH == 32) ? 23 : 0",
+        wrong: "(WIDTH == 32) ? 23 : 10",
+    },
+];
+
+fn assert_found(precision: Precision, faults: &[Fault]) -> Result<(), Error> {
+    let texts: Vec<(&str, String)> = sources::operators(precision)
         .iter()
         .map(|source| {
             let mut text = source.text.to_owned();
-            for fault in FAULTS.iter().filter(|fault| fault.file == source.file) {
+            for fault in faults.iter().filter(|fault| fault.file == source.file) {
                 assert_eq!(text.matches(fault.correct).count(), 1, "{}", fault.file);
                 text = text.replace(fault.correct, fault.wrong);
             }
             (source.file, text)
         })
         .collect();
-    let sources: Vec<_> = texts.iter().map(|&(file, ref text)| Source { file, text }).collect();
-    let tallies = tallies(&sources)?;
-    for Fault { operator, .. } in &FAULTS {
+    let changed: Vec<_> = texts.iter().map(|&(file, ref text)| Source { file, text }).collect();
+    let tallies = tallies(precision, &changed)?;
+    for Fault { operator, .. } in faults {
         for tally in tallies.iter().filter(|tally| tally.operator.name == *operator) {
             assert!(tally.wrong > 0, "{operator}");
         }
     }
     Ok(())
+}
+
+#[test]
+fn a_fault_in_each_operator_is_found() -> Result<(), Error> {
+    assert_found(Precision::F32, &FAULTS)
+}
+
+#[test]
+fn a_fault_in_each_operator_of_binary16_is_found() -> Result<(), Error> {
+    assert_found(Precision::Binary16, &HALF_FAULTS)
 }

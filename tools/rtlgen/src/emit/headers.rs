@@ -6,10 +6,11 @@ use pgs_interface::control::{
     issue, memory_per_record, numbers,
 };
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::{Depth, FLOAT, Inertia, solver};
+use pgs_interface::number::{Numbers, Precision};
+use pgs_interface::profile::{Depth, Inertia, solver};
 
 use crate::design::Design;
-use crate::operators;
+use crate::{number, operators};
 
 use super::text::{Text, line};
 
@@ -40,17 +41,25 @@ pub(super) fn interface() -> String {
         }
         constant(text, 32, "ITERATIONS_MAX", ITERATIONS_MAX);
         constant(text, 32, "QUEUE_PATIENCE", QUEUE_PATIENCE);
-        constant(text, 32, "SOLVER_ROTATION_LIMIT", solver::ROTATION_LIMIT.to_bits());
-        constant(text, 32, "SOLVER_SERIES_TERM", solver::SERIES_TERM.to_bits());
+        for (name, value) in [
+            ("SOLVER_ROTATION_LIMIT", solver::ROTATION_LIMIT),
+            ("SOLVER_SERIES_TERM", solver::SERIES_TERM),
+        ] {
+            constant(text, 32, name, value.to_bits());
+            constant(text, 16, &format!("{name}_HALF"), number::bits(Precision::Binary16, value));
+        }
     })
 }
 
 /// `pgs_operators.vh`: latencies.
-pub(super) fn operators() -> String {
+pub(super) fn operators(precision: Precision) -> String {
     header(|text| {
-        for operator in operators::ALL.map(|operation| operation.operator()) {
+        for operator in operators::ALL.map(|operation| operation.operator(precision)) {
             let name = format!("{}_LATENCY", operator.module.to_uppercase());
             constant(text, 6, &name, u32::try_from(operator.latency).unwrap_or(0));
+        }
+        if precision == Precision::Binary16 {
+            constant(text, 6, "FLOAT_TO_HALF_LATENCY", operators::FLOAT_TO_HALF);
         }
     })
 }
@@ -67,7 +76,7 @@ pub(super) fn schedule(design: &Design) -> String {
         number("DESIGN_INTERLOCKED", parameters.interlocked.into());
         number("DESIGN_SMALLEST_NORMAL", parameters.smallest_normal.into());
         number("DESIGN_WORLD_INERTIA", (parameters.inertia == Inertia::World).into());
-        number("SHAPES", FLOAT.shape_capacity.into());
+        number("SHAPES", parameters.profile.shape_capacity.into());
         number("MEMORY_ADDRESS_STAGES", parameters.address_stages.into());
         number("MEMORY_OUTPUT_STAGES", parameters.output_stages.into());
         for pass in [&design.contact, &design.friction] {
@@ -91,6 +100,7 @@ pub(super) fn schedule(design: &Design) -> String {
 
 fn capabilities(text: &mut Text, design: &Design) {
     let parameters = &design.parameters;
+    let profile = parameters.profile;
     let variant = parameters.variant();
     let (body, collision) = (variant.bytes_per_body(), variant.bytes_per_collision());
     let widths = |streams: &[u32]| {
@@ -104,19 +114,23 @@ fn capabilities(text: &mut Text, design: &Design) {
     let words = [
         ("IDENTIFICATION", control::IDENTIFICATION.reset),
         ("VERSION", control::VERSION.reset),
-        ("PROFILE", FLOAT.id),
+        ("PROFILE", profile.id),
         ("FEATURES", features),
         (
             "CHANNELS",
-            channels::S2MM
-                .put(channels::MM2S.put(0, streams(FLOAT.mm2s_widths)), streams(FLOAT.s2mm_widths)),
+            channels::S2MM.put(
+                channels::MM2S.put(0, streams(profile.mm2s_widths)),
+                streams(profile.s2mm_widths),
+            ),
         ),
-        ("MM2S_WIDTHS", widths(FLOAT.mm2s_widths)),
-        ("S2MM_WIDTHS", widths(FLOAT.s2mm_widths)),
+        ("MM2S_WIDTHS", widths(profile.mm2s_widths)),
+        ("S2MM_WIDTHS", widths(profile.s2mm_widths)),
         (
             "ISSUE",
-            issue::COLLISIONS
-                .put(issue::INTERVAL.put(0, FLOAT.initiation_interval), FLOAT.collisions_per_issue),
+            issue::COLLISIONS.put(
+                issue::INTERVAL.put(0, profile.initiation_interval),
+                profile.collisions_per_issue,
+            ),
         ),
         ("CONTACT_DEPTH", deep(design.depth(&design.contact))),
         ("FRICTION_DEPTH", deep(design.depth(&design.friction))),
@@ -129,7 +143,7 @@ fn capabilities(text: &mut Text, design: &Design) {
             memory_per_record::COLLISION.put(memory_per_record::BODY.put(0, body), collision),
         ),
         ("DMA", dma::ADDRESS_WIDTH.put(dma::LENGTH_WIDTH.put(0, LENGTH_BITS), ADDRESS_BITS)),
-        ("NUMBERS", numbers::COLLISIONS.put(0, variant.numbers.collisions as u32)),
+        ("NUMBERS", formats(&variant.numbers)),
         ("QUEUE", parameters.queue),
         ("FENCE_BASE", fence_base),
         ("FENCE_SIZE", fence_size),
@@ -139,6 +153,17 @@ fn capabilities(text: &mut Text, design: &Design) {
     }
     constant(text, 32, "BYTES_PER_BODY", body);
     constant(text, 32, "BYTES_PER_COLLISION", collision);
+}
+
+/// The NUMBERS register.
+fn formats(of: &Numbers) -> u32 {
+    let word = numbers::COLLISIONS.put(0, of.collisions as u32);
+    let word = numbers::BODIES.put(word, of.bodies as u32);
+    let word = numbers::POSES.put(word, of.poses as u32);
+    let word = numbers::ROWS.put(word, of.rows as u32);
+    let word = numbers::UPDATES.put(word, of.updates as u32);
+    let word = numbers::VELOCITIES.put(word, of.velocities as u32);
+    numbers::IMPULSES.put(word, of.impulses as u32)
 }
 
 /// Places of the queue beside its depth: of collisions that have left the finder and not entered.

@@ -29,11 +29,11 @@ pub fn files(design: &Design) -> Vec<File> {
     let file = |name: &str, text: String| File { name: name.into(), text };
     let mut files = vec![
         file("pgs_interface.vh", headers::interface()),
-        file("pgs_operators.vh", headers::operators()),
+        file("pgs_operators.vh", headers::operators(design.parameters.profile.numbers.updates)),
         file("pgs_schedule.vh", headers::schedule(design)),
     ];
     let mut modules = Vec::new();
-    for source in sources::OPERATORS.iter().chain(sources::AROUND) {
+    for source in sources::of(design.parameters.profile) {
         modules.push(file(source.file, source.text.into()));
     }
     for module in design.modules() {
@@ -51,7 +51,8 @@ pub fn files(design: &Design) -> Vec<File> {
 mod tests {
     use super::*;
     use crate::design::Parameters;
-    use crate::pool;
+    use crate::pool::{self, Unit};
+    use pgs_interface::number::Precision;
 
     /// Instances that leave the rule of the smallest normal number out, in the whole design.
     fn without_rule(smallest_normal: bool) -> usize {
@@ -63,7 +64,8 @@ mod tests {
     #[test]
     fn every_multiplier_and_divider_of_a_pipeline_follows_the_rule_or_none_does() {
         let pool = pool::units(&Design::new(Parameters::default()).pipelines());
-        let rounding = pool.iter().filter(|unit| unit.operation.operator().smallest_normal).count();
+        let rule = |unit: &&Unit| unit.operation.operator(Precision::F32).smallest_normal;
+        let rounding = pool.iter().filter(rule).count();
         assert!(rounding > 100, "{rounding}");
         assert_eq!((without_rule(true), without_rule(false)), (0, rounding));
     }

@@ -13,8 +13,11 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use pgs_interface::number::Precision;
+
 use crate::design::{Module, Pipeline};
 use crate::graph::{Input, Kind, NodeId, Operand, Output};
+use crate::number;
 use crate::pool::{self, Unit};
 
 use super::text::{Text, line};
@@ -29,6 +32,7 @@ pub(super) fn module(module: &Module<'_>, smallest_normal: bool) -> String {
     let pipelines = &module.pipelines;
     let units = pool::units(pipelines);
     let emitter = Emitter {
+        precision: pipelines[0].graph.precision(),
         pipelines,
         smallest_normal,
         nets: nets(pipelines, &units),
@@ -66,7 +70,7 @@ fn nets(pipelines: &[&Pipeline], units: &[Unit]) -> Vec<Vec<Net>> {
         for unit in units {
             for used in unit.of(number) {
                 let net = &mut nets[used.node.index()];
-                (net.driver, net.is_input) = (unit.name(), false);
+                (net.driver, net.is_input) = (unit.name(graph.precision()), false);
             }
         }
         nets
@@ -124,10 +128,12 @@ fn range(width: u32) -> String {
     if width == 1 { String::new() } else { format!("[{}:0] ", width - 1) }
 }
 
-/// A value of a pipeline: its node, and whether it is the upper one of 64 bits.
+/// A value of a pipeline: its node, and whether it is the upper one of two.
 type Value = (usize, NodeId, bool);
 
 struct Emitter<'a> {
+    /// Of all numbers.
+    precision: Precision,
     pipelines: &'a [&'a Pipeline],
     smallest_normal: bool,
     /// For each pipeline, by node.
@@ -152,10 +158,14 @@ impl Emitter<'_> {
         usize::try_from(intervals.max().unwrap_or(1)).unwrap_or(1)
     }
 
-    /// Width of a value on the nets: two values of 32 bits that an operator gives together are two
-    /// nets.
+    /// Width of a value on the nets: two numbers that an operator gives together are two nets.
     fn width(&self, pipeline: usize, node: NodeId) -> u32 {
-        self.pipelines[pipeline].graph.node(node).kind.width().min(32)
+        self.pipelines[pipeline].graph.width(node)
+    }
+
+    /// Width of a number.
+    fn number(&self) -> u32 {
+        number::width(self.precision)
     }
 
     /// The copy of a phase, or of the selector, that belongs to a unit or an input.
@@ -193,17 +203,23 @@ impl Emitter<'_> {
 
     /// The expression of a read at `cycle`.
     fn read(&self, pipeline: usize, operand: &Operand, cycle: i32) -> String {
-        const SIGN: u32 = 1 << 31;
+        let (width, top) = (self.number(), self.number() - 1);
+        let sign = 1 << top;
+        let digits = (width / 4) as usize;
+        let constant = |bits: u32| format!("{width}'h{bits:0digits$x}");
         let graph = &self.pipelines[pipeline].graph;
         if let Kind::Constant(bits) = graph.node(operand.node).kind {
-            return format!("32'h{:08x}", if operand.negated { bits ^ SIGN } else { bits });
+            return constant(if operand.negated { bits ^ sign } else { bits });
         }
         let net = self.net((pipeline, operand.node, operand.upper), cycle);
-        let value = if operand.negated { format!("{{~{net}[31], {net}[30:0]}}") } else { net };
+        let value = match operand.negated {
+            true => format!("{{~{net}[{top}], {net}[{}:0]}}", top - 1),
+            false => net,
+        };
         match operand.gate {
             Some(gate) => {
                 let gate = self.net((pipeline, gate, false), cycle);
-                format!("({gate} ? {value} : 32'h80000000)")
+                format!("({gate} ? {value} : {})", constant(sign))
             }
             None => value,
         }
@@ -313,10 +329,11 @@ impl Emitter<'_> {
             if let [_] = input.nodes[..] {
                 continue;
             }
-            for (part, node) in input.nodes.iter().enumerate() {
-                let low = 32 * part;
+            let width = self.number();
+            for (part, node) in (0..).zip(&input.nodes) {
+                let (low, high) = (width * part, width * (part + 1) - 1);
                 let name = self.name((pipeline, *node, false));
-                line!(text, "  wire [31:0] {name} = {}[{}:{low}];", input.name, low + 31);
+                line!(text, "  wire {}{name} = {}[{high}:{low}];", range(width), input.name);
             }
         }
         // Tools warn of an input that nothing reads.
@@ -332,23 +349,25 @@ impl Emitter<'_> {
         }
     }
 
-    /// The values that a node gives: whether each is the upper one of 64 bits.
+    /// The values that a node gives: whether each is the upper one of two.
     fn parts(&self, pipeline: usize, node: NodeId) -> &'static [bool] {
-        let wide = self.pipelines[pipeline].graph.node(node).kind.width() == 64;
-        if wide { &[false, true] } else { &[false] }
+        let is_pair = self.pipelines[pipeline].graph.node(node).kind.is_pair();
+        if is_pair { &[false, true] } else { &[false] }
     }
 
     /// The result of a unit, and the names of the values that it is.
     fn results(&self, text: &mut Text, unit: &Unit) {
-        let name = unit.name();
-        let width = Kind::Operation(unit.operation).width();
-        line!(text, "  wire {}{name}_y;", range(width));
+        let name = unit.name(self.precision);
+        let Some(first) = unit.uses.first() else { return };
+        let width = self.width(first.pipeline, first.node);
+        let parts = self.parts(first.pipeline, first.node);
+        line!(text, "  wire {}{name}_y;", range(if parts.len() > 1 { 2 * width } else { width }));
         for used in &unit.uses {
-            for part in self.parts(used.pipeline, used.node) {
+            for part in parts {
                 let value = (used.pipeline, used.node, *part);
                 if self.taps.get(&value).is_some_and(|taps| taps.contains(&0)) {
-                    let result = result(&name, width, *part);
-                    line!(text, "  wire {}{} = {result};", range(width.min(32)), self.name(value));
+                    let result = self.result(&name, value);
+                    line!(text, "  wire {}{} = {result};", range(width), self.name(value));
                 }
             }
         }
@@ -371,13 +390,12 @@ impl Emitter<'_> {
             let (base, mut source) = if net.is_input {
                 (net.driver.clone(), net.driver.clone())
             } else {
-                let wide = self.pipelines[pipeline].graph.node(node).kind.width();
                 let phase = match net.interval {
                     1 => String::new(),
                     _ => format!("_phase{}", net.phase),
                 };
                 let base = format!("{}{upper_name}{phase}", net.driver);
-                (base, result(&net.driver, wide, upper))
+                (base, self.result(&net.driver, values[0]))
             };
             let enable = match net.interval {
                 1 => "1'b1".into(),
@@ -409,12 +427,12 @@ impl Emitter<'_> {
     }
 
     fn unit(&self, text: &mut Text, unit: &Unit) {
-        let operator = unit.operation.operator();
-        let name = unit.name();
+        let operator = unit.operation.operator(self.precision);
+        let name = unit.name(self.precision);
         line!(text);
         let mut ports = vec![".clk(clk)".to_owned()];
         for (port, port_name) in operator.ports.iter().enumerate() {
-            let mut width = 32;
+            let mut width = self.number();
             let mut of_pipelines: Vec<(usize, String)> = Vec::new();
             for (pipeline, Pipeline { graph, schedule, .. }) in self.pipelines.iter().enumerate() {
                 let reads = unit.of(pipeline).map(|used| {
@@ -430,10 +448,12 @@ impl Emitter<'_> {
             line!(text, "  wire {}{name}_{port_name} = {read};", range(width));
             ports.push(format!(".{port_name}({name}_{port_name})"));
         }
-        let parameters = if operator.smallest_normal && !self.smallest_normal {
-            "#(.SMALLEST_NORMAL(0)) "
-        } else {
-            ""
+        let parameters = match operator.set_width {
+            Some(width) => format!("#(.WIDTH({width})) "),
+            None if operator.smallest_normal && !self.smallest_normal => {
+                "#(.SMALLEST_NORMAL(0)) ".into()
+            }
+            None => String::new(),
         };
         line!(
             text,
@@ -483,13 +503,14 @@ impl Emitter<'_> {
             format!("{selector} ? ({read}) : ({others})")
         })
     }
-}
 
-/// A part of a unit's result.
-fn result(unit: &str, width: u32, upper: bool) -> String {
-    match (width, upper) {
-        (64, false) => format!("{unit}_y[31:0]"),
-        (64, true) => format!("{unit}_y[63:32]"),
-        _ => format!("{unit}_y"),
+    /// The result of a unit that a value is, or the part of it.
+    fn result(&self, unit: &str, (pipeline, node, upper): Value) -> String {
+        let width = self.number();
+        match (self.parts(pipeline, node).len(), upper) {
+            (1, _) => format!("{unit}_y"),
+            (_, false) => format!("{unit}_y[{}:0]", width - 1),
+            (_, true) => format!("{unit}_y[{}:{width}]", 2 * width - 1),
+        }
     }
 }

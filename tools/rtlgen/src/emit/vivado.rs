@@ -4,7 +4,7 @@
 use pgs_interface::address_map::{
     CONTROL_BASE, CONTROL_BYTES, DDR_LOW, DMA_BYTES, INTERRUPT_SPI, dma_base,
 };
-use pgs_interface::profile::{FLOAT, Inertia};
+use pgs_interface::profile::Inertia;
 use pgs_interface::usr_access::{self, PL_CLOCK_MHZ};
 
 use crate::design::{Design, Parameters};
@@ -18,16 +18,17 @@ const PL_PS_IRQ0_SPI: u32 = 89;
 
 /// The array `pgs`, one `set` line an entry.
 pub(super) fn numbers(design: &Design) -> String {
+    let profile = design.parameters.profile;
     let mut text = Text::default();
     let mut set = |name: &str, value: String| line!(text, "set pgs({name}) {value}");
     set("top", TOP.into());
     set("clock_khz", design.parameters.clock_khz.to_string());
     for (name, widths) in
-        [("mm2s_stream_bits", FLOAT.mm2s_widths), ("s2mm_stream_bits", FLOAT.s2mm_widths)]
+        [("mm2s_stream_bits", profile.mm2s_widths), ("s2mm_stream_bits", profile.s2mm_widths)]
     {
         set(name, list(widths.iter().map(u32::to_string)));
     }
-    let cores = FLOAT.mm2s_widths.len().max(FLOAT.s2mm_widths.len());
+    let cores = profile.mm2s_widths.len().max(profile.s2mm_widths.len());
     set("dma_addresses", list((0..cores).map(|core| hexadecimal(dma_base(core)))));
     set("dma_bytes", hexadecimal(DMA_BYTES.into()));
     set("dma_length_bits", LENGTH_BITS.to_string());

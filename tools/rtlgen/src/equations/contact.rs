@@ -6,6 +6,7 @@
 //!   l = (e + b) * J;  u = max(L_i + l, 0);  l = u - L_i;  L_i = u;  apply
 //! ```
 
+use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
 
 use super::row::{self, Row};
@@ -20,8 +21,8 @@ use crate::graph::{Graph, Source};
 /// product with J. The impulse of an unused point means nothing, and its flag keeps it from every
 /// sum. Where impulses leave the chip, both are put out as 0.
 #[must_use]
-pub fn contact(points: usize, inertia: Inertia) -> Graph {
-    let mut graph = Graph::default();
+pub fn contact(precision: Precision, points: usize, inertia: Inertia) -> Graph {
+    let mut graph = Graph::new(precision);
     let g = &mut graph;
     let solves = g.input(Source::Switch, "solves");
     let normal = g.input3(Source::Record, "normal");

@@ -14,6 +14,7 @@
 //!                                  t_0 = (-n.y*k, n.x*k, 0)   t_1 = (-n.z*t_0.y, n.z*t_0.x, s*k)
 //! ```
 
+use pgs_interface::number::Precision;
 use pgs_interface::profile::Inertia;
 use pgs_interface::profile::solver::{SPIN_COSINE, TANGENT_Z};
 use pgs_interface::record::CONTACT_POINTS;
@@ -24,11 +25,11 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 /// The graph of a friction pass.
 ///
 /// `per_count` is 1 / count, `coefficient_of_friction` the one of the collision, `impulse0` the
-/// normal impulse that the last contact pass stored, `impulse1` and `impulse2` the tangents'
-/// impulses, and `one_static` tells whether a body of the collision is static.
+/// normal impulse that the last contact pass stored, `impulse1` and `impulse2` are the impulses
+/// along the tangents, and `one_static` tells whether a body of the collision is static.
 #[must_use]
-pub fn friction(inertia: Inertia) -> Graph {
-    let mut graph = Graph::default();
+pub fn friction(precision: Precision, inertia: Inertia) -> Graph {
+    let mut graph = Graph::new(precision);
     let g = &mut graph;
     let solves = g.input(Source::Switch, "solves");
     let normal = g.input3(Source::Record, "normal");

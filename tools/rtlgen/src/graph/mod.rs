@@ -9,6 +9,10 @@ mod vector;
 
 use std::collections::{BTreeSet, HashMap};
 
+use pgs_interface::number::Precision;
+
+use crate::number;
+
 pub use vector::{Symmetric, Vec3};
 
 /// Number of a node in its graph. Operands of a node have smaller numbers than the node.
@@ -51,7 +55,7 @@ pub enum Operation {
     Divide,
     /// Square root of a.
     SquareRoot,
-    /// Sine and cosine of a, side by side in 64 bits.
+    /// Sine and cosine of a, side by side.
     SineCosine,
     /// a > b ? a : b
     Maximum,
@@ -78,24 +82,27 @@ pub enum Operation {
 pub enum Kind {
     /// An input of the pipeline.
     Input(Source),
-    /// A constant, as the bits of its f32.
+    /// A constant, as the bits of its number.
     Constant(u32),
     /// A result of an operator.
     Operation(Operation),
 }
 
 impl Kind {
-    /// Width of the value, bits.
+    /// Whether the value is one bit, not a number.
     #[must_use]
-    pub fn width(self) -> u32 {
-        match self {
-            Self::Input(Source::Flag | Source::Switch)
-            | Self::Operation(
-                Operation::Less | Operation::NonZero | Operation::Or | Operation::And,
-            ) => 1,
-            Self::Operation(Operation::SineCosine) => 64,
-            _ => 32,
-        }
+    pub fn is_flag(self) -> bool {
+        use Operation::{And, Less, NonZero, Or};
+        matches!(
+            self,
+            Self::Input(Source::Flag | Source::Switch) | Self::Operation(Less | NonZero | Or | And)
+        )
+    }
+
+    /// Whether the value is two numbers, the first in the low bits.
+    #[must_use]
+    pub fn is_pair(self) -> bool {
+        self == Self::Operation(Operation::SineCosine)
     }
 
     /// Whether the value is the same for all records of a pass and needs no delay.
@@ -121,7 +128,7 @@ pub struct Operand {
     pub node: NodeId,
     /// The sign is inverted.
     pub negated: bool,
-    /// The upper 32 of 64 bits are read.
+    /// The upper one of two numbers is read.
     pub upper: bool,
     /// Where this bit is 0, -0 is read instead, which changes no sum, not even one that is -0.
     pub gate: Option<NodeId>,
@@ -191,8 +198,9 @@ pub struct Output {
 }
 
 /// The equations of one pipeline.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Graph {
+    precision: Precision,
     nodes: Vec<Node>,
     inputs: Vec<Input>,
     outputs: Vec<Output>,
@@ -202,6 +210,32 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// No equations yet, in numbers of a precision.
+    #[must_use]
+    pub fn new(precision: Precision) -> Self {
+        Self {
+            precision,
+            nodes: Vec::new(),
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            known: HashMap::new(),
+            names: BTreeSet::new(),
+            scope: Vec::new(),
+        }
+    }
+
+    /// The precision of all numbers.
+    #[must_use]
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// Bits of a value, or of each of two numbers that an operator gives together.
+    #[must_use]
+    pub fn width(&self, id: NodeId) -> u32 {
+        if self.node(id).kind.is_flag() { 1 } else { number::width(self.precision) }
+    }
+
     /// The nodes; operands come before the nodes that read them.
     #[must_use]
     pub fn nodes(&self) -> &[Node] {
@@ -318,9 +352,9 @@ impl Graph {
         self.outputs.push(Output { name: name.into(), operands: operands.into() });
     }
 
-    /// A constant.
+    /// The constant nearest to a value.
     pub fn constant(&mut self, value: f32) -> Operand {
-        let kind = Kind::Constant(value.to_bits());
+        let kind = Kind::Constant(number::bits(self.precision, value));
         Operand::of(self.shared(kind, Vec::new(), "constant"))
     }
 
@@ -430,7 +464,7 @@ mod tests {
 
     #[test]
     fn the_same_product_is_computed_once_whatever_its_signs() {
-        let mut graph = Graph::default();
+        let mut graph = Graph::new(Precision::F32);
         let a = graph.input(Source::Record, "a");
         let b = graph.input(Source::Record, "b");
         let product = graph.multiply(a, b);
@@ -442,7 +476,7 @@ mod tests {
 
     #[test]
     fn names_lead_back_to_the_scope_and_are_unique() {
-        let mut graph = Graph::default();
+        let mut graph = Graph::new(Precision::F32);
         let a = graph.input(Source::Record, "a");
         let (one, two) = graph.within("point0", |graph| {
             graph.within("row", |graph| (graph.add(a, a), graph.subtract(a, a)))

@@ -83,6 +83,8 @@ impl Graph {
 
 #[cfg(test)]
 mod tests {
+    use pgs_interface::number::Precision;
+
     use super::super::{Graph, Operand, Operation, Source};
     use super::Vec3;
 
@@ -102,7 +104,7 @@ mod tests {
     /// order.
     #[test]
     fn a_matrix_multiplies_by_its_rows_from_the_left() {
-        let mut graph = Graph::default();
+        let mut graph = Graph::new(Precision::F32);
         let v = graph.input3(Source::Record, "v");
         let matrix = graph.input_symmetric(Source::Record, "k");
         let Vec3(product) = graph.times(v.negated(), matrix);

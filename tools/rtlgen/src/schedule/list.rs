@@ -46,7 +46,7 @@ pub(super) fn as_late_as_possible(graph: &Graph, interval: i32) -> List {
         .collect();
     while let Some(Candidate { node, .. }) = ready.pop_first() {
         let kind = graph.node(node).kind;
-        let latest = first_read(&starts, node) - latency(kind);
+        let latest = first_read(&starts, node) - latency(graph, node);
         let start = kind.operation().map_or(latest, |operation| units.take(operation, latest));
         starts[node.index()] = Some(start);
         for read in graph.node(node).reads() {
@@ -67,8 +67,7 @@ fn distance_from_velocities(graph: &Graph) -> Vec<i32> {
     for id in graph.ids() {
         let node = graph.node(id);
         let start = if node.kind == Kind::Input(Source::Velocity) { 0 } else { UNREACHED };
-        let reads =
-            node.reads().map(|read| distance[read.index()] + latency(graph.node(read).kind));
+        let reads = node.reads().map(|read| distance[read.index()] + latency(graph, read));
         distance[id.index()] = reads.fold(start, i32::max);
     }
     distance

@@ -85,7 +85,7 @@ impl Schedule {
     /// Cycle from which a node's value can be read.
     #[must_use]
     pub fn ready(&self, graph: &Graph, node: NodeId) -> i32 {
-        self.starts[node.index()] + latency(graph.node(node).kind)
+        self.starts[node.index()] + latency(graph, node)
     }
 
     /// The phase of a cycle.
@@ -137,8 +137,9 @@ fn bind(graph: &Graph, starts: &[i32], interval: i32) -> Vec<Unit> {
 }
 
 /// Cycles from the read of a node's operands to its value.
-fn latency(kind: Kind) -> i32 {
-    kind.operation().map_or(0, |operation| operation.operator().latency)
+fn latency(graph: &Graph, node: NodeId) -> i32 {
+    let operation = graph.node(node).kind.operation();
+    operation.map_or(0, |operation| operation.operator(graph.precision()).latency)
 }
 
 fn round_down(cycle: i32, interval: i32) -> i32 {
@@ -153,14 +154,17 @@ fn round_up(cycle: i32, interval: i32) -> i32 {
 mod tests {
     use super::*;
     use crate::equations;
+    use pgs_interface::number::Precision;
     use pgs_interface::profile::Inertia;
 
     fn all() -> Vec<(Graph, u32)> {
-        let mut all =
-            vec![(equations::integration(), 1), (equations::contact(4, Inertia::Isotropic), 3)];
-        for inertia in [Inertia::Isotropic, Inertia::World] {
-            all.push((equations::contact(4, inertia), 2));
-            all.push((equations::friction(inertia), 2));
+        let mut all = Vec::new();
+        for (precision, passes, bodies) in [(Precision::F32, 2, 1), (Precision::Binary16, 3, 4)] {
+            all.push((equations::integration(precision), bodies));
+            for inertia in [Inertia::Isotropic, Inertia::World] {
+                all.push((equations::contact(precision, 4, inertia), passes));
+                all.push((equations::friction(precision, inertia), passes));
+            }
         }
         all
     }

@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use pgs_interface::control::QUEUE_MAX;
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{FLOAT, HALF, Inertia};
 use rtlgen::design::{BuildError, Design, Parameters};
 
 /// The behaviour of the hardware on a hazard.
@@ -33,10 +33,22 @@ enum InertiaForm {
     World,
 }
 
+/// The profiles that have Verilog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ProfileName {
+    /// Four streams of 128 bits, f32.
+    Float,
+    /// Streams of 128, 128 and 64 bits, binary16, two collisions in three cycles.
+    Half,
+}
+
 /// A build of the accelerator.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Build")]
 pub(crate) struct BuildArgs {
+    /// Profile of the build
+    #[arg(long, value_enum, default_value_t = ProfileName::Float)]
+    profile: ProfileName,
     /// Inertia of a body: equal about every axis, or any (boxes, cylinders and others), streamed
     /// with every body
     #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
@@ -51,7 +63,7 @@ pub(crate) struct BuildArgs {
     #[arg(long, value_enum, default_value_t = Hazards::Interlocked)]
     hazards: Hazards,
     /// Collisions that wait in the issue queue; 0: no queue. Only an interlocked build can have one
-    /// [default: the profile's, 64; unchecked 0]
+    /// [default: the profile's, 64 in `float`; unchecked 0]
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u32).range(0..=i64::from(QUEUE_MAX)))]
     queue: Option<u32>,
@@ -70,9 +82,9 @@ pub(crate) struct BuildArgs {
     /// 64K, at a multiple of it. The device tree must reserve the same
     #[arg(long, value_name = "BASE+BYTES", default_value_t = Fence::default())]
     memory: Fence,
-    /// Clock that the capability register reports, kHz
-    #[arg(long, value_name = "KHZ", default_value_t = Parameters::default().clock_khz)]
-    clock_khz: u32,
+    /// Clock that the capability register reports, kHz [default: the profile's]
+    #[arg(long, value_name = "KHZ")]
+    clock_khz: Option<u32>,
 }
 
 impl BuildArgs {
@@ -82,9 +94,14 @@ impl BuildArgs {
             InertiaForm::Isotropic => Inertia::Isotropic,
             InertiaForm::World => Inertia::World,
         };
-        let default = Parameters::with(inertia);
+        let profile = match self.profile {
+            ProfileName::Float => &FLOAT,
+            ProfileName::Half => &HALF,
+        };
+        let default = Parameters::of(profile, inertia);
         let interlocked = self.hazards == Hazards::Interlocked;
         let parameters = Parameters {
+            profile,
             bodies: self.bodies.unwrap_or(default.bodies),
             collisions: self.collisions.unwrap_or(default.collisions),
             inertia,
@@ -94,7 +111,7 @@ impl BuildArgs {
             output_stages: self.output_stages,
             smallest_normal: self.smallest_normal == SmallestNormal::Exact,
             memory: self.memory,
-            clock_khz: self.clock_khz,
+            clock_khz: self.clock_khz.unwrap_or(default.clock_khz),
         };
         parameters.check()?;
         Ok(Design::new(parameters))

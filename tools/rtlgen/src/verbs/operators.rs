@@ -4,7 +4,9 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use pgs_interface::number::Precision;
+use rtlgen::verify::half;
 use rtlgen::verify::operators::{OPERATORS, Tally, Wrong, verify};
 use rtlgen::verify::simulation::Simulator;
 use rtlgen::verify::vectors::{Vector, Vectors};
@@ -12,12 +14,26 @@ use serde_json::{Value, json};
 
 use super::{Error, progress_bar};
 
+/// The format of the operators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Numbers {
+    /// IEEE 754 binary32, subnormal numbers flushed.
+    Binary32,
+    /// IEEE 754 binary16, subnormal numbers kept.
+    Binary16,
+}
+
 /// Simulates the operators with Verilator and compares every result with a reference.
 ///
 /// The reference is arithmetic in integers (`rustc_apfloat`) with the flush rules of the
-/// specification; sine and cosine are libm's. Result bits and latencies must agree.
+/// specification; sine and cosine are libm's. Result bits and latencies must agree. In binary16
+/// 65,536 vectors hold every operand of the operators with one, and every pair of signs and
+/// exponents of the others has the same share.
 #[derive(Debug, Args)]
 pub(crate) struct Operators {
+    /// Format of the operators
+    #[arg(long, value_enum, default_value_t = Numbers::Binary32)]
+    numbers: Numbers,
     /// Vectors for each operator
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     vectors: u64,
@@ -32,12 +48,22 @@ pub(crate) struct Operators {
 /// Fails if a result is wrong.
 pub(crate) fn run(args: &Operators, out: &mut dyn Write) -> Result<ExitCode, Error> {
     let start = Instant::now();
-    let simulator = Simulator::build()?;
-    let build = start.elapsed();
     let bar = progress_bar(args.vectors, "vectors");
-    let vectors = Vectors::new(args.seed);
-    let tallies =
-        verify(&simulator, &OPERATORS, vectors, args.vectors, |done| bar.set_position(done))?;
+    let progress = |done| bar.set_position(done);
+    let (build, tallies) = match args.numbers {
+        Numbers::Binary32 => {
+            let simulator = Simulator::build(Precision::F32)?;
+            let vectors = Vectors::new(args.seed);
+            let build = start.elapsed();
+            (build, verify(&simulator, &OPERATORS, vectors, args.vectors, progress)?)
+        }
+        Numbers::Binary16 => {
+            let simulator = Simulator::build(Precision::Binary16)?;
+            let vectors = half::Vectors::new(args.seed);
+            let build = start.elapsed();
+            (build, verify(&simulator, &half::OPERATORS, vectors, args.vectors, progress)?)
+        }
+    };
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     if args.json {

@@ -63,7 +63,7 @@ fn print(design: &Design, pipeline: &Pipeline, out: &mut dyn Write) -> Result<()
         writeln!(
             out,
             "  {:<10} {:>10} {:>7} {:>9}",
-            operation.operator().module,
+            operation.operator(pipeline.graph.precision()).module,
             usage.operations,
             usage.units,
             least(&usage, schedule.interval)
@@ -76,7 +76,7 @@ fn document(design: &Design, pipeline: &Pipeline) -> Value {
     let schedule = &pipeline.schedule;
     let units = schedule.usage().into_iter().map(|(operation, usage)| {
         json!({
-            "operator": operation.operator().module,
+            "operator": operation.operator(pipeline.graph.precision()).module,
             "operations": usage.operations,
             "units": usage.units,
         })

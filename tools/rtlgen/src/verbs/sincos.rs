@@ -7,6 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use clap::Args;
+use pgs_interface::number::Precision;
 use rtlgen::verify::operators::{self, Tally};
 use rtlgen::verify::simulation::Simulator;
 use rtlgen::verify::sincos;
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &Sincos, out: &mut dyn Write) -> Result<ExitCode, Error>
 
 /// Simulates `fsincos` on every `step`-th argument.
 fn verilog(step: u32, arguments: u64) -> Result<Tally, Error> {
-    let simulator = Simulator::build()?;
+    let simulator = Simulator::build(Precision::F32)?;
     let vectors = sincos::POLYNOMIAL
         .step_by(step as usize)
         .map(|argument| Vector { argument, ..Vector::default() });

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitStatus;
 
+pub mod half;
 pub mod operators;
 pub mod reference;
 pub mod simulation;

@@ -13,18 +13,18 @@ pub struct Operator {
     pub name: &'static str,
     /// Register stages.
     pub latency: usize,
-    expected: fn(&Vector) -> u64,
-    found: fn(&Outputs) -> u64,
+    pub(super) expected: fn(&Vector) -> u64,
+    pub(super) found: fn(&Outputs) -> u64,
 }
 
 /// The longest latency.
 const LONGEST: usize = 29;
 
-fn pair(low: u32, high: u32) -> u64 {
+pub(super) fn pair(low: u32, high: u32) -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// The operators of `operators_top.v`.
+/// The operators of binary32, as in `operators_top.v`.
 pub static OPERATORS: [Operator; 16] = [
     Operator {
         name: "add",

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::thread;
 
+use pgs_interface::number::Precision;
 use tempfile::TempDir;
 
 use super::Error;
@@ -28,7 +29,15 @@ pub const RESULTS: usize = 14;
 pub type Outputs = [u32; RESULTS];
 
 /// The simulator's own Verilog.
-const TOP: Source<'_> = Source { file: "operators_top.v", text: include_str!("operators_top.v") };
+fn top(precision: Precision) -> Source<'static> {
+    let text = match precision {
+        Precision::F32 => include_str!("operators_top.v"),
+        Precision::Binary16 => include_str!("operators_half_top.v"),
+    };
+    Source { file: TOP, text }
+}
+
+const TOP: &str = "operators_top.v";
 
 /// A built simulator of the operators. Its folder is removed with it.
 #[derive(Debug)]
@@ -38,13 +47,14 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Builds the simulator from the operators in the repository, in a temporary folder.
+    /// Builds the simulator from the operators of a precision in the repository, in a temporary
+    /// folder.
     ///
     /// # Errors
     ///
     /// A tool is missing, or the build fails.
-    pub fn build() -> Result<Self, Error> {
-        Self::build_from(sources::OPERATORS)
+    pub fn build(precision: Precision) -> Result<Self, Error> {
+        Self::build_from(precision, &sources::operators(precision))
     }
 
     /// Builds it from other files, for example with a fault in one of them.
@@ -52,14 +62,14 @@ impl Simulator {
     /// # Errors
     ///
     /// As [`Simulator::build`].
-    pub fn build_from(operators: &[Source<'_>]) -> Result<Self, Error> {
+    pub fn build_from(precision: Precision, operators: &[Source<'_>]) -> Result<Self, Error> {
         const PURPOSE: &str = "the simulation of the operators";
         verilator::require(PURPOSE)?;
         let folder = verilator::place()?;
         let write = |file: &str, text: &str| {
             fs::write(folder.path().join(file), text).map_err(Error::io("write the sources"))
         };
-        for Source { file, text } in operators.iter().chain([&TOP]) {
+        for Source { file, text } in operators.iter().chain([&top(precision)]) {
             write(file, text)?;
         }
         write("operators_main.cpp", include_str!("operators_main.cpp"))?;
@@ -97,7 +107,7 @@ impl Simulator {
 /// Verilates and compiles the files in a folder.
 fn verilate(folder: &Path) -> Result<(), Error> {
     let sizes = format!("-O2 -DBATCH={BATCH} -DOPERANDS={OPERANDS} -DRESULTS={RESULTS}");
-    let files = [TOP.file, "operators_main.cpp"].map(str::to_owned);
+    let files = [TOP, "operators_main.cpp"].map(str::to_owned);
     verilator::build(
         folder,
         &verilator::Build { top: "operators_top", flags: &sizes, files: &files, waveform: false },

@@ -117,6 +117,8 @@ pub fn compare(step: u32, threads: usize, progress: impl Fn(u64) + Sync) -> Diff
 
 #[cfg(test)]
 mod tests {
+    use pgs_interface::number::Precision;
+
     use super::*;
 
     #[test]
@@ -168,7 +170,8 @@ mod tests {
     /// The Verilog has the same coefficients.
     #[test]
     fn the_verilogs_coefficients_are_these() {
-        let source = crate::sources::OPERATORS.iter().find(|source| source.file == "pgs_fsincos.v");
+        let mut sources = crate::sources::operators(Precision::F32).into_iter();
+        let source = sources.find(|source| source.file == "pgs_fsincos.v");
         let text = source.map_or("", |source| source.text);
         for (letter, coefficients) in [('S', SINE), ('C', COSINE)] {
             for (index, coefficient) in (1..).zip(coefficients) {
