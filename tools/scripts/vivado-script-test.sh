@@ -28,11 +28,13 @@ generate() { attend "$target_root/debug/rtlgen" generate --out "$folder/$1" "${@
 generate rtl
 # The largest builds for the other boards, as the script names them.
 declare -A world=([kv260]='--bodies 4096 --collisions 8192' [zcu104]='--bodies 8192 --collisions 45056')
+declare -A half=([kv260]='--bodies 4096 --collisions 24576' [zcu104]='--bodies 16384 --collisions 61440')
 declare -A largest=([kv260]='--bodies 4096 --collisions 16384' [zcu104]='--bodies 12288 --collisions 49152')
 cp -r "$folder/rtl" "$folder/zcu102"
 # shellcheck disable=SC2086 # options of rtlgen, each a word
 for board in "${!largest[@]}"; do generate "$board" ${largest[$board]}; done
 generate world --inertia world
+generate half --profile half
 
 # Runs a script with the stand-in; its last lines.
 mock() { tclsh tools/vivado/mock.tcl "$1" -rtl "$folder/rtl" -out "$folder/out" "${@:2}" 2>&1; }
@@ -71,11 +73,8 @@ for board in zcu104 kv260 zcu102; do
 	[[ $said != *warning* ]] || fail "a warning: $said"
 done
 # Three streams, one of them narrow: a DMA core, a port and two interrupts less.
-cp -r "$folder/rtl" "$folder/three"
-sed -i 's/, [sm]3_axis_[a-z]*//; s/:[sm]3_axis//g' "$folder/three/pgs_top.v"
-sed -i 's/128 128 128 128/128 128 128/; s/ 0xA0030000//' "$folder/three/pgs_vivado.tcl"
-said=$(mock tools/vivado/build.tcl -rtl "$folder/three" -until design) || fail "three streams: the script is refused: $said"
-[[ $said = *"7 sources on pl_ps_irq0"* && $said != *HP3* ]] || fail "three streams: $said"
+said=$(mock tools/vivado/build.tcl -rtl "$folder/half" -until design) || fail "half: the script is refused: $said"
+[[ $said = *"7 sources on pl_ps_irq0"* && $said != *HP3* ]] || fail "half: $said"
 generate high --memory 0x840000000+1G
 said=$(mock tools/vivado/build.tcl -rtl "$folder/high" -until design) || fail "another memory: $said"
 fences DDR_HIGH '0x0840000000 \+ 0x40000000' "$said"
@@ -105,7 +104,8 @@ refused "a slow clock" "slower than the clock of the registers" tools/vivado/bui
 for board in "${!largest[@]}"; do
 	refused "the default build on $board" "rtlgen generate ${largest[$board]} is the largest" tools/vivado/build.tcl -board "$board"
 	refused "world inertia on $board" "rtlgen generate ${world[$board]} is the largest" tools/vivado/build.tcl -board "$board" -rtl "$folder/world"
-	grep -q -e "${largest[$board]}.*${world[$board]}" docs/bitstream.md || fail "docs/bitstream.md has other builds for $board"
+	refused "half on $board" "rtlgen generate ${half[$board]} is the largest" tools/vivado/build.tcl -board "$board" -rtl "$folder/half"
+	grep -q -e "${largest[$board]}.*${world[$board]}.*${half[$board]}" docs/bitstream.md || fail "docs/bitstream.md has other builds for $board"
 done
 generate high104 --memory 0x840000000+1G --bodies 4096 --collisions 16384
 refused "memory that the board does not have" "the zcu104 has no DDR_HIGH" tools/vivado/build.tcl -board zcu104 -rtl "$folder/high104"
@@ -186,7 +186,7 @@ script=build.tcl
 	plant "a design that is not validated" $script '/^\tvalidate_bd_design/d' "before it is valid"
 }
 # The blocks that the script counts are those of the Verilog, but for the FIFOs of the results.
-for build in rtl world kv260 zcu104; do
+for build in rtl world half kv260 zcu104; do
 	command -v yosys >/dev/null || break
 	yosys -q -p "read_verilog -I$folder/$build $(sed "s|^|$folder/$build/|" "$folder/$build/pgs.f" | tr '\n' ' ')
 		blackbox pgs_solver; hierarchy -top pgs_top; proc; write_json $folder/memories.json" >"$folder/log" 2>&1 || fail "Yosys on $build: $(tail -n 3 "$folder/log")"

@@ -100,9 +100,10 @@ proc build::blocks {words bits} {
 	return $sum
 }
 
-# Blocks of all large memories for so many bodies and collisions.
+# Blocks of all large memories for these numbers of bodies and collisions. A bank has half the bodies.
 proc build::blocks_for {bodies collisions} {
 	global pgs
+	set bank [expr {($bodies + 1) / 2}]
 	set sum 0
 	foreach memory $pgs(memories) {
 		lassign $memory words bits
