@@ -1,8 +1,8 @@
 // The accelerator without its registers: beats in, beats out.
 //
-//   receivers -> bodies ------------------------------------> velocities <-> contact, friction
-//            \-> finder -> issue or queue -> record registers -> contact / friction pipeline
-//            \-> integrator -> integration pipeline -> senders
+//   receivers -> bodies ------------------------------------> velocities <-> solver
+//            \-> finder -> issue or queue -> record registers -> solver: contact and friction
+//            \-> integrator -> solver: integration -> senders
 //
 // An issue slot of two cycles carries a collision or nothing, and nothing behind the issue ever
 // stops: no pipeline has a clock enable. README.md has the block diagram, the memories and the
@@ -113,12 +113,13 @@ module pgs_core (
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
   );
 
-  wire [31:0] per_second, speed_limit, half_step, series;
+  wire [31:0] per_second, speed_limit, half_step, half_angle_limit, series;
   wire [95:0] gravity_step;
   pgs_constants #(.SMALLEST_NORMAL(DESIGN_SMALLEST_NORMAL)) numbers (
     .clk(clk), .start(start), .time_step(time_step),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
-    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step), .series(series),
+    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step),
+    .half_angle_limit(half_angle_limit), .series(series),
     .gravity_step(gravity_step)
   );
 
@@ -330,13 +331,18 @@ module pgs_core (
     end
     if (phase) begin
       valid <= second & ~clear;
-      rows  <= {rest_rows, early};
       friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
       {mass_a, mass_b, points} <= {early_mass_a, early_mass_b, early_points};
     end
     if (clear) valid <= 1'b0;
+  end
+  // One register enables no more than 1,200 bits, so that the rows have a copy of the phase.
+  (* keep = "true" *) reg phase_of_rows;
+  always @(posedge clk) begin
+    phase_of_rows <= slot_begins;
+    if (phase_of_rows) rows <= {rest_rows, early};
   end
 
   wire [3:0] used = {points > 3'd3, points > 3'd2, points > 3'd1, points != 3'd0};
@@ -382,7 +388,7 @@ module pgs_core (
   // phase 1, so that no address is read while it is written
 
   wire [191:0] velocity_a, velocity_b;
-  wire [191:0] contact_velocity_a, contact_velocity_b, friction_velocity_a, friction_velocity_b;
+  wire [191:0] solved_velocity_a, solved_velocity_b;
   reg          write_a, write_b;
   reg  [BODY-1:0] write_address_a, write_address_b;
   reg  [191:0] write_velocity_a, write_velocity_b;
@@ -391,8 +397,8 @@ module pgs_core (
     write_b          <= ~clear & ends & (friction ? friction_moves_b : contact_moves_b);
     write_address_a  <= friction ? friction_write_a : contact_write_a;
     write_address_b  <= friction ? friction_write_b : contact_write_b;
-    write_velocity_a <= friction ? friction_velocity_a : contact_velocity_a;
-    write_velocity_b <= friction ? friction_velocity_b : contact_velocity_b;
+    write_velocity_a <= solved_velocity_a;
+    write_velocity_b <= solved_velocity_b;
   end
   wire in_pass = passing | draining;
   pgs_true_dual_port #(
@@ -413,9 +419,8 @@ module pgs_core (
   // ---- Impulses
 
   wire [31:0]  impulse0, impulse1, impulse2, impulse3;
-  wire [127:0] contact_impulses;
+  wire [127:0] solved_impulses;        // L_3 .. L_0; in a friction pass G_1 and G_0 in the middle
   wire [31:0]  contact_total;
-  wire [63:0]  friction_impulses;
   pgs_impulses #(
     .COLLISIONS(COLLISIONS), .COLLISION(COLLISION),
     .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
@@ -424,52 +429,14 @@ module pgs_core (
     .warm(warm), .give(warm & valid & phase), .given(rows[1023:896]),
     .last_contact(last_contact), .no_contacts(no_contacts), .read(reads_impulse),
     .impulse0(impulse0), .impulse1(impulse1), .impulse2(impulse2), .impulse3(impulse3),
-    .write(ends), .contact_impulses(contact_impulses), .contact_total(contact_total),
-    .friction_impulses(friction_impulses)
+    .write(ends), .solved(solved_impulses), .contact_total(contact_total)
   );
   pgs_impulse_sum impulse_words (
     .clk(clk), .clear(clear), .valid(ends & contact_ends & last_contact & ~contact_padding),
     .total(contact_total[30:0]), .sum(impulse_total)
   );
 
-  // ---- Pipelines
-
-  pgs_contact contact_pipeline (
-    .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
-    .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
-    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[PROPERTIES-1:32]),
-    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[PROPERTIES-1:32]),
-    .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
-    .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
-    .per_second(per_second), .drift(drift), .coefficient(coefficient),
-    .point0(rows[479:384]), .distance0(rows[511:480]), .used0(used[0]), .impulse0(impulse0),
-    .point1(rows[607:512]), .distance1(rows[639:608]), .used1(used[1]), .impulse1(impulse1),
-    .point2(rows[735:640]), .distance2(rows[767:736]), .used2(used[2]), .impulse2(impulse2),
-    .point3(rows[863:768]), .distance3(rows[895:864]), .used3(used[3]), .impulse3(impulse3),
-    .out_impulse0(contact_impulses[31:0]), .out_impulse1(contact_impulses[63:32]),
-    .out_impulse2(contact_impulses[95:64]), .out_impulse3(contact_impulses[127:96]),
-    .out_total(contact_total),
-    .out_linear_a(contact_velocity_a[95:0]), .out_angular_a(contact_velocity_a[191:96]),
-    .out_linear_b(contact_velocity_b[95:0]), .out_angular_b(contact_velocity_b[191:96])
-  );
-  pgs_friction friction_pipeline (
-    .clk(clk), .phase({phase, slot_begins}), .solves(~warm),
-    .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
-    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[PROPERTIES-1:32]),
-    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[PROPERTIES-1:32]),
-    .per_count(per_count), .one_static(one_static), .used0(used[0]),
-    .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
-    .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
-    .point0(rows[479:384]), .point1(rows[607:512]), .point2(rows[735:640]), .point3(rows[863:768]),
-    .used1(used[1]), .used2(used[2]), .used3(used[3]),
-    .total(impulse0), .friction(friction_of), .spin_damping(spin_damping),
-    .impulse0(impulse1), .impulse1(impulse2),
-    .out_impulse0(friction_impulses[31:0]), .out_impulse1(friction_impulses[63:32]),
-    .out_linear_a(friction_velocity_a[95:0]), .out_angular_a(friction_velocity_a[191:96]),
-    .out_linear_b(friction_velocity_b[95:0]), .out_angular_b(friction_velocity_b[191:96])
-  );
-
-  // ---- Integration and streams out
+  // ---- Bodies into the integration
 
   wire         body_valid, body_free;
   wire [31:0]  body_damping;
@@ -483,18 +450,39 @@ module pgs_core (
     .valid(body_valid), .pose(body_pose), .free(body_free), .body_damping(body_damping)
   );
 
+  // ---- Contact passes, friction passes and the integration
+
   wire [95:0]  new_position, new_linear, new_angular;
   wire [127:0] new_orientation;
-  pgs_integration integration_pipeline (
-    .clk(clk),
+  pgs_solver solver (
+    .clk(clk), .phase({phase, slot_begins}), .friction(friction), .integrating(integrating), .solves(~warm),
+    .normal(rows[95:0]), .position_a(rows[223:128]), .position_b(rows[351:256]),
+    .inverse_mass_a(mass_a[31:0]), .inverse_inertia_a(mass_a[PROPERTIES-1:32]),
+    .inverse_mass_b(mass_b[31:0]), .inverse_inertia_b(mass_b[PROPERTIES-1:32]),
+    .linear_a(velocity_a[95:0]), .angular_a(velocity_a[191:96]),
+    .linear_b(velocity_b[95:0]), .angular_b(velocity_b[191:96]),
+    .per_second(per_second), .drift(drift), .coefficient(coefficient),
+    .per_count(per_count), .one_static(one_static), .coefficient_of_friction(friction_of),
+    .spin_damping(spin_damping),
+    .point0(rows[479:384]), .distance0(rows[511:480]), .used0(used[0]), .impulse0(impulse0),
+    .point1(rows[607:512]), .distance1(rows[639:608]), .used1(used[1]), .impulse1(impulse1),
+    .point2(rows[735:640]), .distance2(rows[767:736]), .used2(used[2]), .impulse2(impulse2),
+    .point3(rows[863:768]), .distance3(rows[895:864]), .used3(used[3]), .impulse3(impulse3),
+    .out_impulse0(solved_impulses[31:0]), .out_impulse1(solved_impulses[63:32]),
+    .out_impulse2(solved_impulses[95:64]), .out_impulse3(solved_impulses[127:96]),
+    .out_total(contact_total),
+    .out_linear_a(solved_velocity_a[95:0]), .out_angular_a(solved_velocity_a[191:96]),
+    .out_linear_b(solved_velocity_b[95:0]), .out_angular_b(solved_velocity_b[191:96]),
     .position(body_pose[95:0]), .orientation(body_pose[255:128]),
     .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .damping(body_damping),
     .integrates(integrate), .free(body_free),
     .time_step(time_step), .gravity_step(gravity_step),
-    .half_step(half_step), .series(series), .speed_limit(speed_limit),
+    .half_step(half_step), .series(series), .speed_limit(speed_limit), .half_angle_limit(half_angle_limit),
     .out_position(new_position), .out_orientation(new_orientation),
     .out_linear(new_linear), .out_angular(new_angular)
   );
+
+  // ---- Streams out
 
   wire result_valid;
   pgs_timed_flag #(.STAGES(INTEGRATION_DEPTH)) result_time (
@@ -508,7 +496,7 @@ module pgs_core (
   reg  [127:0] impulse_row;
   always @(posedge clk) begin
     impulse_valid <= ends & sends & ~clear;
-    impulse_row   <= friction ? {64'd0, friction_impulses} : contact_impulses;
+    impulse_row   <= friction ? {64'd0, solved_impulses[95:32]} : solved_impulses;
   end
   assign result[0] = impulse_valid ? impulse_row : numbers_valid ? numbers_row : {32'd0, new_position};
   assign result[1] = new_orientation;

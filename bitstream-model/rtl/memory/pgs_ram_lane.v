@@ -1,12 +1,13 @@
 // Some bits of each word of a memory with two ports: tiles of 2^TILE words, side by side over the
-// addresses. Latency of a read: 2 cycles.
+// addresses. Latency of a read: 2 cycles. Without READS_A nothing reads port A.
 `default_nettype none
 
 module pgs_ram_lane #(
   parameter integer WIDTH   = 9,
   parameter integer DEPTH   = 4096,
   parameter integer ADDRESS = 12,
-  parameter integer TILE    = 12
+  parameter integer TILE    = 12,
+  parameter integer READS_A = 1
 ) (
   input  wire               clk,
   input  wire               write_a,
@@ -49,7 +50,7 @@ module pgs_ram_lane #(
           .in_b(in_b), .out_b(from_b[i])
         );
       end
-      assign out_a = from_a[tile_a];
+      assign out_a = (READS_A != 0) ? from_a[tile_a] : {WIDTH{1'b0}};
       assign out_b = from_b[tile_b];
     end
   endgenerate

@@ -9,7 +9,8 @@
 //
 // Latency of a read: ADDRESS_STAGES + 1 + OUTPUT_STAGES cycles. A write passes the same
 // ADDRESS_STAGES, so that accesses take effect in the order in which they are made. OUTPUT_STAGES is at
-// least 1: the first output stage lies in the blocks, and the choice between the tiles follows it.
+// least 1: the first output stage lies in the blocks, and the choice between the tiles follows it. Without READS_A
+// nothing reads port A, and there is no choice for it.
 `default_nettype none
 
 module pgs_true_dual_port #(
@@ -17,7 +18,8 @@ module pgs_true_dual_port #(
   parameter integer DEPTH          = 1024,
   parameter integer ADDRESS        = 10,
   parameter integer ADDRESS_STAGES = 0,
-  parameter integer OUTPUT_STAGES  = 1
+  parameter integer OUTPUT_STAGES  = 1,
+  parameter integer READS_A        = 1
 ) (
   input  wire               clk,
   input  wire               write_a,
@@ -52,14 +54,14 @@ module pgs_true_dual_port #(
 
   generate
     if (NINES != 0) begin : g_nines
-      pgs_ram_lane #(.WIDTH(NINES), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(12)) lane (
+      pgs_ram_lane #(.WIDTH(NINES), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(12), .READS_A(READS_A)) lane (
         .clk(clk),
         .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[NINES-1:0]), .out_a(read_a[NINES-1:0]),
         .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[NINES-1:0]), .out_b(read_b[NINES-1:0])
       );
     end
     if (REST != 0) begin : g_rest
-      pgs_ram_lane #(.WIDTH(REST), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(TILE)) lane (
+      pgs_ram_lane #(.WIDTH(REST), .DEPTH(DEPTH), .ADDRESS(ADDRESS), .TILE(TILE), .READS_A(READS_A)) lane (
         .clk(clk),
         .write_a(write_a_late), .address_a(address_a_late), .in_a(in_a_late[WIDTH-1:NINES]), .out_a(read_a[WIDTH-1:NINES]),
         .write_b(write_b_late), .address_b(address_b_late), .in_b(in_b_late[WIDTH-1:NINES]), .out_b(read_b[WIDTH-1:NINES])
@@ -67,7 +69,7 @@ module pgs_true_dual_port #(
     end
   endgenerate
 
-  pgs_pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES - 1)) output_a (
+  pgs_pipeline_register #(.WIDTH(WIDTH), .STAGES((READS_A != 0) ? OUTPUT_STAGES - 1 : 0)) output_a (
     .clk(clk), .d(read_a), .q(out_a)
   );
   pgs_pipeline_register #(.WIDTH(WIDTH), .STAGES(OUTPUT_STAGES - 1)) output_b (

@@ -35,9 +35,8 @@ module pgs_impulses #(
   input  wire [127:0] given,            // L_3 .. L_0, or G_1 and G_0
 
   input  wire         write,
-  input  wire [127:0] contact_impulses, // L_3 .. L_0
-  input  wire [31:0]  contact_total,
-  input  wire [63:0]  friction_impulses // G_1, G_0
+  input  wire [127:0] solved,           // L_3 .. L_0; in a friction pass G_1 and G_0 in the middle
+  input  wire [31:0]  contact_total
 );
   reg  [COLLISION-1:0] next_read, next_given, next_write, write_address;
   reg                  write_outer, write_inner;
@@ -55,9 +54,8 @@ module pgs_impulses #(
     write_outer   <= (give | write) & ~friction;
     write_inner   <= give | write;
     outer_in      <= give ? {given[127:96], given[31:0]}
-                   : {contact_impulses[127:96], last_contact ? contact_total : contact_impulses[31:0]};
-    inner_in      <= give ? (friction ? given[63:0] : given[95:32])
-                   : friction ? friction_impulses : contact_impulses[95:32];
+                   : {solved[127:96], last_contact ? contact_total : solved[31:0]};
+    inner_in      <= give ? (friction ? given[63:0] : given[95:32]) : solved[95:32];
   end
 
   // A pass writes both words of a memory or none. Port A writes, port B reads.
@@ -65,14 +63,14 @@ module pgs_impulses #(
   wire        unused = &{1'b0, unused_outer, unused_inner};
   pgs_true_dual_port #(
     .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
-    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES), .READS_A(0)
   ) outer_words (
     .clk(clk), .write_a(write_outer), .address_a(write_address), .in_a(outer_in), .out_a(unused_outer),
     .write_b(1'b0), .address_b(next_read), .in_b(64'd0), .out_b(outer)
   );
   pgs_true_dual_port #(
     .WIDTH(64), .DEPTH(COLLISIONS), .ADDRESS(COLLISION),
-    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES)
+    .ADDRESS_STAGES(ADDRESS_STAGES), .OUTPUT_STAGES(OUTPUT_STAGES), .READS_A(0)
   ) inner_words (
     .clk(clk), .write_a(write_inner), .address_a(write_address), .in_a(inner_in), .out_a(unused_inner),
     .write_b(1'b0), .address_b(next_read), .in_b(64'd0), .out_b(inner)

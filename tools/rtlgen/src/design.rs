@@ -131,7 +131,7 @@ impl Parameters {
 /// A pipeline: its equations and their schedule.
 #[derive(Debug)]
 pub struct Pipeline {
-    /// Name of the Verilog module.
+    /// Its name, which is also the prefix of its values in the Verilog.
     pub name: &'static str,
     /// The equations.
     pub graph: Graph,
@@ -144,6 +144,15 @@ impl Pipeline {
         let schedule = Schedule::new(&graph, interval);
         Self { name, graph, schedule }
     }
+}
+
+/// A module of the hardware: pipelines that never run together, on one pool of units.
+#[derive(Debug)]
+pub struct Module<'a> {
+    /// Its name in the Verilog, without the prefix `pgs_` of all modules.
+    pub name: &'static str,
+    /// The pipelines: one, two or three.
+    pub pipelines: Vec<&'a Pipeline>,
 }
 
 /// A build of profile `float`.
@@ -188,6 +197,12 @@ impl Design {
     #[must_use]
     pub fn pipelines(&self) -> [&Pipeline; 3] {
         [&self.contact, &self.friction, &self.integration]
+    }
+
+    /// The modules that the pipelines are.
+    #[must_use]
+    pub fn modules(&self) -> Vec<Module<'_>> {
+        vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }]
     }
 
     /// Fill and hazard window of a pipeline, if it is one of the passes.
@@ -318,8 +333,9 @@ mod tests {
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
-        // The slowest one: the second quotient, with registers before and behind the divider.
-        let ready = Operation::Divide.operator().latency + 4;
+        // The second quotient, with registers before and behind the divider, and two products of it.
+        let quotient = Operation::Divide.operator().latency + 4;
+        let half_angle_limit = quotient + 2 * (Operation::Multiply.operator().latency + 1);
         // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];
@@ -332,6 +348,8 @@ mod tests {
                     let argument = node.kind == Kind::Input(Source::Argument);
                     if argument && !given.contains(&node.name.as_str()) {
                         let at = at_least + schedule.starts[id.index()];
+                        let last = node.name == "half_angle_limit";
+                        let ready = if last { half_angle_limit } else { quotient };
                         assert!(at >= ready, "{} is read at {at}, there at {ready}", node.name);
                         computed += 1;
                     }
@@ -339,8 +357,8 @@ mod tests {
             }
         }
         assert!(
-            computed >= 2 * 7,
-            "per_second, speed_limit, half_step, series and gravity are read"
+            computed >= 2 * 8,
+            "per_second, speed_limit, half_angle_limit, half_step, series and gravity are read"
         );
     }
 }

@@ -11,6 +11,7 @@ pub mod ending;
 pub mod equations;
 pub mod graph;
 pub mod operators;
+pub mod pool;
 pub mod schedule;
 pub mod simulator;
 pub mod sources;

@@ -49,7 +49,7 @@ impl Operation {
             Self::Multiply => ("fmul", AB, 5, true),
             Self::Divide => ("fdiv", AB, 29, true),
             Self::SquareRoot => ("fsqrt", &["a"], 27, true),
-            Self::SineCosine => ("fsincos", &["a"], 20, true),
+            Self::SineCosine => ("fsincos", &["a"], 26, true),
             Self::Maximum => ("fmax", AB, 1, false),
             Self::Minimum => ("fmin", AB, 1, false),
             Self::Less => ("fless", AB, 1, false),

@@ -1,8 +1,9 @@
-//! Writes a design as Verilog-2001: a module for each pipeline, and headers with the facts that the
+//! Writes a design as Verilog-2001: a module for the
+//! pipelines, and headers with the facts that the
 //! hand-written modules need of it. The block design of Vivado gets its numbers likewise.
 
 mod headers;
-mod pipeline;
+mod solver;
 mod text;
 mod vivado;
 
@@ -35,9 +36,9 @@ pub fn files(design: &Design) -> Vec<File> {
     for source in sources::OPERATORS.iter().chain(sources::AROUND) {
         modules.push(file(source.file, source.text.into()));
     }
-    for pipeline in design.pipelines() {
-        let text = pipeline::pipeline(pipeline, design.parameters.smallest_normal);
-        modules.push(file(&format!("pgs_{}.v", pipeline.name), text));
+    for module in design.modules() {
+        let text = solver::module(&module, design.parameters.smallest_normal);
+        modules.push(file(&format!("pgs_{}.v", module.name), text));
     }
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
     files.append(&mut modules);
@@ -50,6 +51,7 @@ pub fn files(design: &Design) -> Vec<File> {
 mod tests {
     use super::*;
     use crate::design::Parameters;
+    use crate::pool;
 
     /// Instances that leave the rule of the smallest normal number out, in the whole design.
     fn without_rule(smallest_normal: bool) -> usize {
@@ -60,14 +62,9 @@ mod tests {
 
     #[test]
     fn every_multiplier_and_divider_of_a_pipeline_follows_the_rule_or_none_does() {
-        let design = Design::new(Parameters::default());
-        let rounding = design
-            .pipelines()
-            .iter()
-            .flat_map(|pipeline| &pipeline.schedule.units)
-            .filter(|unit| unit.operation.operator().smallest_normal)
-            .count();
-        assert!(rounding > 200, "{rounding}");
+        let pool = pool::units(&Design::new(Parameters::default()).pipelines());
+        let rounding = pool.iter().filter(|unit| unit.operation.operator().smallest_normal).count();
+        assert!(rounding > 100, "{rounding}");
         assert_eq!((without_rule(true), without_rule(false)), (0, rounding));
     }
 }

@@ -23,9 +23,9 @@ use crate::graph::{Graph, Operand, Source, Vec3};
 
 /// The graph of a friction pass.
 ///
-/// `per_count` is 1 / count, `friction` the coefficient of the collision, `total` the normal
-/// impulse that the last contact pass stored, and `one_static` tells whether a body of the
-/// collision is static.
+/// `per_count` is 1 / count, `coefficient_of_friction` the one of the collision, `impulse0` the
+/// normal impulse that the last contact pass stored, `impulse1` and `impulse2` the tangents'
+/// impulses, and `one_static` tells whether a body of the collision is static.
 #[must_use]
 pub fn friction(inertia: Inertia) -> Graph {
     let mut graph = Graph::default();
@@ -47,15 +47,15 @@ pub fn friction(inertia: Inertia) -> Graph {
         }
         g.scale(sum, per_count)
     });
-    let total = g.input(Source::Impulse, "total");
-    let friction = g.input(Source::Record, "friction");
+    let total = g.input(Source::Impulse, "impulse0");
+    let friction = g.input(Source::Record, "coefficient_of_friction");
     let limit = g.within("limit", |g| g.multiply(friction, total));
     let axis = normal.negated();
     let tangents = g.within("tangents", |g| tangents(g, axis));
     let arms = positions.map(|position| g.within("arm", |g| g.subtract3(centre, position)));
 
     for (k, tangent) in tangents.into_iter().enumerate() {
-        let before = g.input(Source::Impulse, &format!("impulse{k}"));
+        let before = g.input(Source::Impulse, &format!("impulse{}", k + 1));
         g.within(&format!("tangent{k}"), |g| {
             let row = Row::new(g, tangent, arms, masses);
             let acts = g.non_zero(always, row.jacobian);
@@ -67,7 +67,7 @@ pub fn friction(inertia: Inertia) -> Graph {
                 g.minimum_or(solves, [after, limit], before)
             });
             let change = g.within("impulse", |g| g.subtract(after, before.only_if(solves)));
-            row::output_impulse(g, &format!("impulse{k}"), after, acts);
+            row::output_impulse(g, &format!("impulse{}", k + 1), after, acts);
             velocities = row.apply(g, change, acts, velocities, masses);
         });
     }

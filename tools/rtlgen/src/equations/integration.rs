@@ -8,8 +8,9 @@
 //! ```
 //!
 //! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
-//! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
-//! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
+//! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt,
+//! `half_angle_limit` = (`speed_limit`*dt) * 0.5 and the three components of g*dt. So the half angle
+//! is there in time, whether the body is too fast or not. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
 //! rest it keeps its pose, too. The arguments of the sine and of the cosine are the same number,
 //! for a factor of 0.5 is exact.
 
@@ -69,13 +70,17 @@ fn output_if<const N: usize>(
 
 /// The rotation of one time step as a quaternion: h, and the cosine of half the angle.
 fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
-    let [half_step, series, speed_limit] =
-        ["half_step", "series", "speed_limit"].map(|name| g.input(Source::Argument, name));
+    let [half_step, series, speed_limit, half_angle_limit] =
+        ["half_step", "series", "speed_limit", "half_angle_limit"]
+            .map(|name| g.input(Source::Argument, name));
     let square = g.dot(angular, angular);
     let speed = g.square_root(square);
     let limit = g.constant(ROTATION_LIMIT);
     let angle = g.multiply(speed, time_step);
     let too_fast = g.less(limit, angle);
+    let half = g.constant(0.5);
+    let half_angle = g.multiply(angle, half);
+    let half_angle = g.select(too_fast, half_angle_limit, half_angle);
     let speed = g.select(too_fast, speed_limit, speed);
 
     let slow_below = g.constant(SERIES_BELOW);
@@ -84,9 +89,6 @@ fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
     let term = g.multiply(term, speed);
     let by_series = g.subtract(half_step, term);
 
-    let angle = g.multiply(speed, time_step);
-    let half = g.constant(0.5);
-    let half_angle = g.multiply(angle, half);
     let [sine, cosine] = g.sine_cosine(half_angle);
     let by_sine = g.divide(sine, speed);
     let scale = g.select(slow, by_series, by_sine);
