@@ -168,7 +168,6 @@ check pgs_issue pdr \
 parts='' parameters=
 check pgs_control_block pdr \
 	'if (bready) bvalid' 'bvalid' \
-	'writes & whole & ~resetting' 'writes & ~resetting' \
 	'& ~sticky & ~failed) go' '& ~sticky) go'
 parts='pgs_fifo pgs_word_sum' parameters='CHANNEL=3'
 check pgs_receiver 'pdr -F 22' \
