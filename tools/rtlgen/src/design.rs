@@ -212,7 +212,7 @@ pub struct Design {
     /// Friction passes, likewise.
     pub friction: Pipeline,
     /// Integration, as fast as the streams take results: in `float` a body a cycle, in `half` five
-    /// bodies in four cycles, for which there are five pipelines.
+    /// bodies in four cycles, by five pipelines.
     pub integration: Pipeline,
 }
 
@@ -221,8 +221,8 @@ struct Around {
     /// Between the issue of a collision and cycle 0 of its pipeline, and between the results and
     /// the first issue that sees them: record registers, write registers.
     pass: u32,
-    /// Of a step in which nothing is loaded, passed or integrated, beside the way of the last body
-    /// through the integration.
+    /// The cycles of a step in which nothing is loaded, passed or integrated, beside the way of the
+    /// last body through the integration.
     step: u32,
     /// From a body to the next in one pipeline of the integration.
     interval: u32,
