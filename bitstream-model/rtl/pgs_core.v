@@ -334,7 +334,6 @@ module pgs_core (
   always @(posedge clk) begin
     second <= issues & ~clear;
     if (slot_begins) begin
-      early <= first_rows;
       {early_a, early_b, early_moves_a, early_moves_b} <= {issue_a, issue_b, issue_moves_a, issue_moves_b};
       {early_mass_a, early_mass_b, early_points}       <= {issue_mass_a, issue_mass_b, issue_points};
     end
@@ -347,10 +346,12 @@ module pgs_core (
     end
     if (clear) valid <= 1'b0;
   end
-  // One register enables no more than 1,200 bits, so that the rows have a copy of the phase.
-  (* keep = "true" *) reg phase_of_rows;
+  // One register enables no more than 1,200 bits, so that the rows have copies of both.
+  (* keep = "true" *) reg slot_of_rows, phase_of_rows;
   always @(posedge clk) begin
+    slot_of_rows  <= phase;
     phase_of_rows <= slot_begins;
+    if (slot_of_rows) early <= first_rows;
     if (phase_of_rows) rows <= {rest_rows, early};
   end
 
