@@ -244,7 +244,7 @@ fn the_tree_the_constants_and_the_script_have_one_segment_and_a_guard_behind_it(
     let of_script = format!("set pgs(memory) {{0x{:X} 0x{:X}}}\n", fence.base(), fence.bytes());
     assert!(numbers.text.contains(&of_script), "{}", numbers.text);
     let script =
-        fs::read_to_string(sources().join("../tools/vivado/zcu102.tcl")).expect("the script");
+        fs::read_to_string(sources().join("../tools/vivado/build.tcl")).expect("the script");
     let places = script.lines().filter(|line| line.contains("{*}$pgs(memory)"));
     assert_eq!(places.count(), 1, "the script gives a master this segment at one place");
     let constants = (address_map::MEMORY_BASE, address_map::MEMORY_BYTES);

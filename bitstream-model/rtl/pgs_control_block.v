@@ -188,7 +188,7 @@ module pgs_control_block (
     if (bready) bvalid <= 1'b0;
     if (writes) bvalid <= 1'b1;
     if (write_here) begin
-      if ((write_address == OFFSET_AP_CTRL) & write_data[0] & ~running & ~sticky) go <= 1'b1;
+      if ((write_address == OFFSET_AP_CTRL) & write_data[0] & ~running & ~sticky & ~failed) go <= 1'b1;
       if (write_address == OFFSET_GIE) gie <= write_data[0];
       if (write_address == OFFSET_IER) ier <= write_data[2:0];
       if (~running) begin

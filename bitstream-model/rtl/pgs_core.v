@@ -113,12 +113,13 @@ module pgs_core (
     .cycles(cycles), .work_cycles(work_cycles), .wait_cycles(wait_cycles)
   );
 
-  wire [31:0] per_second, speed_limit, half_step, series;
+  wire [31:0] per_second, speed_limit, half_step, half_angle_limit, series;
   wire [95:0] gravity_step;
   pgs_constants #(.SMALLEST_NORMAL(DESIGN_SMALLEST_NORMAL)) numbers (
     .clk(clk), .start(start), .time_step(time_step),
     .gravity_x(gravity_x), .gravity_y(gravity_y), .gravity_z(gravity_z),
-    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step), .series(series),
+    .per_second(per_second), .speed_limit(speed_limit), .half_step(half_step),
+    .half_angle_limit(half_angle_limit), .series(series),
     .gravity_step(gravity_step)
   );
 
@@ -333,13 +334,11 @@ module pgs_core (
   always @(posedge clk) begin
     second <= issues & ~clear;
     if (slot_begins) begin
-      early <= first_rows;
       {early_a, early_b, early_moves_a, early_moves_b} <= {issue_a, issue_b, issue_moves_a, issue_moves_b};
       {early_mass_a, early_mass_b, early_points}       <= {issue_mass_a, issue_mass_b, issue_points};
     end
     if (phase) begin
       valid <= second & ~clear;
-      rows[511:0]              <= early;
       friction_of              <= pair_friction ? own_friction : friction_coefficient;
       {body_a, body_b}         <= {early_a, early_b};
       {moves_a, moves_b}       <= {early_moves_a & second, early_moves_b & second};
@@ -347,11 +346,13 @@ module pgs_core (
     end
     if (clear) valid <= 1'b0;
   end
-  // One register enables no more than 1,200 bits, so that half of the rows has a copy of the phase.
-  (* keep = "true" *) reg phase_of_rest;
+  // One register enables no more than 1,200 bits, so that the rows have copies of both.
+  (* keep = "true" *) reg slot_of_rows, phase_of_rows;
   always @(posedge clk) begin
-    phase_of_rest <= slot_begins;
-    if (phase_of_rest) rows[1023:512] <= rest_rows;
+    slot_of_rows  <= phase;
+    phase_of_rows <= slot_begins;
+    if (slot_of_rows) early <= first_rows;
+    if (phase_of_rows) rows <= {rest_rows, early};
   end
 
   wire [3:0] used = {points > 3'd3, points > 3'd2, points > 3'd1, points != 3'd0};
@@ -486,7 +487,7 @@ module pgs_core (
     .linear(velocity_a[95:0]), .angular(velocity_a[191:96]), .damping(body_damping),
     .integrates(integrate), .free(body_free),
     .time_step(time_step), .gravity_step(gravity_step),
-    .half_step(half_step), .series(series), .speed_limit(speed_limit),
+    .half_step(half_step), .series(series), .speed_limit(speed_limit), .half_angle_limit(half_angle_limit),
     .out_position(new_position), .out_orientation(new_orientation),
     .out_linear(new_linear), .out_angular(new_angular)
   );

@@ -67,7 +67,7 @@ pub(super) fn fence(accelerator: &mut Accelerator) -> Outcome {
         format!("{} in reach of {at:#x}, behind the fence {fence}", open.join(", ")),
         format!("a decode error of each of {masters} masters"),
         "give every master of the DMA cores this one segment in the block design, and exclude all \
-         others (tools/vivado/zcu102.tcl); until then only the driver confines them",
+         others (tools/vivado/build.tcl); until then only the driver confines them",
     )
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Counts a step of the driver on a Cortex-A53, on paper, and solvers in software beside it: docs/a53-cost.md.
+# Counts a step of the driver on a Cortex-A53, on paper, and solvers in software beside it: docs/worth.md.
 #
 # usage: a53-step.sh [--quick] [FOLDER]
 #

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Counts a step of the driver on a Cortex-A53, and solvers in software beside it: the tables of docs/a53-cost.md.
+"""Counts a step of the driver on a Cortex-A53, and solvers in software beside it: the tables of docs/worth.md.
 
 usage: a53_step.py PGS PLUGIN [--quick] [FOLDER]
 
@@ -16,7 +16,7 @@ import sys
 CLOCKS = 1.2e6  # a ms (ZCU102: AMD UG1182)
 WATTS = 15.0  # of the board (thesis, table 6.11)
 CORES = (1, 2, 4)
-# GB/s that 1, 2 and 4 cores copy: docs/a53-cost.md, "The machine".
+# GB/s that 1, 2 and 4 cores copy: docs/worth.md, "The model of the processor".
 COPIES = {1: 1.96, 2: 3.12, 4: 3.61}
 # Bytes that the driver writes a collision, and writes and reads a body (specification, section 2).
 OF_COLLISION, OF_BODY = 112, 128

@@ -110,7 +110,7 @@ for example in tools/capi/examples/*; do put 644 "$example" "$documents/examples
 put 644 $sources/debian/copyright "$documents/copyright"
 python3 -B $sources/licences.py "$rust_target" pgs zynq-pgs-c > "$tree/$documents/third-party.txt"
 {
-	printf 'zynq-pgs (%s) unstable; urgency=medium\n\n  * docs/CHANGELOG.md lists the changes.\n\n' "$version"
+	printf 'zynq-pgs (%s) unstable; urgency=medium\n\n  * CHANGELOG.md lists the changes.\n\n' "$version"
 	printf ' -- %s  %s\n' "$maintainer" "$(LC_ALL=C date -u -R -d "@$SOURCE_DATE_EPOCH")"
 } > "$tree/$documents/changelog"
 gzip -9n "$tree/$documents"/{changelog,third-party.txt}

@@ -7,8 +7,9 @@
 #          --scenes   random steps for each form of inertia: 2, with --full 100
 #          --cycles   the longest step among them, without waits: 2200, with --full 6000
 #          --seed     of the random steps and of the pauses: 1
-#          --full     every part on both builds: faults in packets and all golden folders, too. Two million cycles:
-#                     Verilator takes the place of Icarus, which has unknown levels, but runs 80 cycles a second
+#          --full     every part on both builds: faults in packets and all golden folders, too. Three million cycles:
+#                     Verilator, whose build takes minutes, takes the place of Icarus, which has unknown levels, but
+#                     runs 70 cycles a second where Verilator runs 3,000
 #        rtl-cocotb.sh --help
 #
 # environment: TOOLS (a folder with a Python that has cocotb, cocotbext-axi and numpy; otherwise they are installed

@@ -55,7 +55,7 @@ table() {
 	attend python3 tools/scripts/rtl_memories.py --brams "$2" "$work/$1/memories.json"
 	echo
 	attend python3 tools/scripts/rtl_resources.py --brams "$2" \
-		"$work/$1/pgs_top.json" "$work"/base/pgs_{solver,integration}.json
+		"$work/$1/pgs_top.json" "$work/base/pgs_solver.json"
 }
 
 # Prints what the rule of the smallest normal number takes in each operator that has it, and in all of them.
@@ -66,11 +66,11 @@ rule() {
 		parameters='-set SMALLEST_NORMAL 0' synthesise without "$operator"
 	done
 	attend python3 tools/scripts/rtl_resources.py --rule "$work/base" "$work/without" \
-		"$work"/base/pgs_{top,solver,integration}.json
+		"$work"/base/pgs_{top,solver}.json
 }
 
 parameters=
-pipelines=(pgs_solver pgs_integration)
+pipelines=(pgs_solver)
 generate base "$@"
 synthesise base pgs_top "${pipelines[@]}"
 for pipeline in "${pipelines[@]}"; do synthesise base "$pipeline"; done

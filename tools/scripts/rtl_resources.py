@@ -33,12 +33,11 @@ DEVICE = (274_080, None, 548_160, 2_520, 912)
 # Table 6.4 of the thesis, percent of the device; with its DMA engines.
 THESIS = (47, None, 32, 42, 70)
 # Of a build with isotropic inertia, and of one with world inertia.
-LIMITS = ({LUT: 200_000, DSP: 540}, {LUT: 225_000, DSP: 610})
+LIMITS = ({LUT: 132_000, FF: 110_000, DSP: 380}, {LUT: 150_000, FF: 130_000, DSP: 380})
 
 # The part of a module and of all below it, unless one of them is a part of its own.
 PARTS = {
-    "solver": "solver: contact and friction",
-    "integration": "integration",
+    "solver": "solver: contact, friction, integration",
     "receiver": "streams",
     "sender": "streams",
     "finder": "finder with last uses, issue",

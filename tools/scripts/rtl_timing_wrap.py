@@ -1,36 +1,30 @@
 #!/usr/bin/env python3
 """Makes a module of generated Verilog ready for place and route on its own.
 
-usage: rtl_timing_wrap.py wrap FILE MODULE     a module `wrap` around it, with three pins
-       rtl_timing_wrap.py stub FILE MODULE     a module of its name and ports with next to no logic
+usage: rtl_timing_wrap.py wrap PORTS MODULE [PARAMETER=VALUE...]     a module `wrap` around it, with three pins
+       rtl_timing_wrap.py stub PORTS MODULE     a module of its name, parameters and ports with next to no logic
+
+PORTS is a file that Yosys' write_json wrote of the module, with these parameters.
 
 `wrap` feeds the inputs from a shift register and folds the outputs, four bits a cycle, into one: all paths
 of the module begin and end at registers, and none of the wrapper's is long. `stub` folds the inputs into the
 outputs in the same way, so that no logic around the module vanishes.
 """
-import re
+import json
 import sys
 
-PORT = re.compile(r"^\s*(input|output)\s+(?:wire|reg)\s+(?:\[(\d+):0\]\s+)?([\w, ]+?),?\s*$")
 CLOCKS = {"clk", "aclk"}
 
 
-def ports(path, module):
-    """Direction, width and name of each port; widths are numbers in all modules that are wrapped."""
+def read(path, module):
+    """Names of the parameters; direction, width and name of each port."""
     with open(path, encoding="utf-8") as file:
-        text = file.read()
-    text = re.sub(r"\(\*.*?\*\)", "", text)
-    head = re.search(rf"^module {module}\b(.*?)^\);", text, re.S | re.M).group(1)
-    found = []
-    for line in head.splitlines():
-        match = PORT.match(line)
-        if match:
-            for name in match[3].split(","):
-                found.append((match[1], int(match[2] or 0) + 1, name.strip()))
-    return found
+        found = json.load(file)["modules"][module]
+    ports = [(port["direction"], len(port["bits"]), name) for name, port in found["ports"].items()]
+    return list(found.get("parameter_default_values", {})), ports
 
 
-def wrap(module, found):
+def wrap(module, parameters, found):
     """The wrapper."""
     inputs = [(width, name) for way, width, name in found if way == "input" and name not in CLOCKS]
     outputs = [(width, name) for way, width, name in found if way == "output"]
@@ -48,7 +42,8 @@ def wrap(module, found):
     for width, name in outputs:
         connections.append(f".{name}(outputs[{at} +: {width}])")
         at += width
-    print(f"  {module} wrapped ({', '.join(connections)});")
+    values = ", ".join(".{}({})".format(*parameter.split("=")) for parameter in parameters)
+    print(f"  {module} {f'#({values}) ' if values else ''}wrapped ({', '.join(connections)});")
     print(f"  reg [{bits_out - 1}:0] fold0;")
     print("  always @(posedge clk) fold0 <= outputs;")
     level, width = 0, bits_out
@@ -65,14 +60,14 @@ def wrap(module, found):
     print("endmodule")
 
 
-def stub(module, found):
+def stub(module, parameters, found):
     """The stub: two registers deep, an exclusive or of a few inputs at every output."""
     inputs = [(width, name) for way, width, name in found if way == "input" and name not in CLOCKS]
     outputs = [(width, name) for way, width, name in found if way == "output"]
     bits_in, bits_out = sum(width for width, _ in inputs), sum(width for width, _ in outputs)
-    # Instances of the operators give it.
-    parameter = "#(parameter SMALLEST_NORMAL = 1) " if module in ("fmul", "fdiv") else ""
-    print(f"module {module} {parameter}(")
+    # Instances may give them.
+    values = ", ".join(f"parameter {name} = 0" for name in parameters)
+    print(f"module {module} {f'#({values}) ' if values else ''}(")
     print(",\n".join(f"  {way} wire [{width - 1}:0] {name}" for way, width, name in found))
     print(");")
     rows = -(-bits_in // bits_out)
@@ -88,10 +83,14 @@ def stub(module, found):
 
 def main():
     """Writes the module to standard output."""
-    if len(sys.argv) != 4 or sys.argv[1] not in ("wrap", "stub"):
+    if len(sys.argv) < 4 or sys.argv[1] not in ("wrap", "stub"):
         sys.exit(__doc__)
-    _, what, path, module = sys.argv
-    {"wrap": wrap, "stub": stub}[what](module, ports(path, module))
+    what, path, module, *given = sys.argv[1:]
+    parameters, found = read(path, module)
+    if what == "wrap":
+        wrap(module, given, found)
+    else:
+        stub(module, parameters, found)
 
 
 if __name__ == "__main__":

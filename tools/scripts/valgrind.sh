@@ -17,7 +17,7 @@ check() {
 	attend timeout "${VALGRIND_LIMIT:-600}" valgrind --quiet --error-exitcode=1 --exit-on-first-error=yes \
 		--undef-value-errors=no --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite "$@"
 }
-# A C program over the shared library, installed and linked as docs/c.md says.
+# A C program over the shared library, installed and linked as docs/engines.md says.
 check_c() {
 	local prefix abi found
 	prefix=$(mktemp -d)

@@ -1,4 +1,4 @@
-# A stand-in for Vivado's commands, for tclsh: it runs tools/vivado/zcu102.tcl and checks the structure of the
+# A stand-in for Vivado's commands, for tclsh: it runs tools/vivado/build.tcl and checks the structure of the
 # block design that the script builds.
 #
 #   tclsh tools/vivado/mock.tcl SCRIPT [OPTION VALUE]...      the options are the script's
@@ -11,7 +11,7 @@
 #   - a channel of a DMA core at the wrong stream of the accelerator
 #   - an interrupt that does not reach pl_ps_irq0
 #   - a segment that is missing, superfluous, or not where the interface has it; for a master of a DMA core any
-#     but the one of the fence
+#     but the one of the fence, and any address of the chip's map that is not excluded
 #   - a memory port that is not held non-secure (AxPROT[1])
 #   - a DMA core, a port or a clock that is not built as the interface says
 #   - a header or a module of the Verilog that is not in the project
@@ -19,7 +19,7 @@
 # The pins and parameters of Vivado's IP in this file are a transcript by hand. That Vivado has them is not
 # checked by anything here.
 #
-# environment: MOCK_SLACK, the slack that the implementation reports (0.1)
+# environment: MOCK_SLACK, the slack that the implementation reports (0.1); MOCK_VERSION, of Vivado (2024.1)
 
 proc refuse {message} {
 	puts stderr "refused: $message"
@@ -29,6 +29,24 @@ proc leave {code} { exit $code }
 
 # ---------------------------------------------------------------------------------------------------------
 # The IP: parameters with the pattern of their values, pins, buses
+
+# The boards by their device: the name of the board files, and the end of the DDR.
+set boards {
+	xczu9eg-ffvb1156-2-e {zcu102 0x880000000}
+	xck26-sfvc784-2LV-c {kv260_som 0x880000000}
+	xczu7ev-ffvc1156-2-e {zcu104 0x80000000}
+}
+# What an access at a memory port of the processing system reaches, as UG1085 maps the chip's addresses: the name
+# in Vivado, first byte, bytes. The DDR ends where the board's does.
+set address_map {
+	DDR_LOW 0x0 0x80000000
+	QSPI 0xC0000000 0x20000000
+	PCIE_LOW 0xE0000000 0x10000000
+	LPS_OCM 0xFF000000 0x1000000
+	PCIE_HIGH1 0x600000000 0x200000000
+	DDR_HIGH 0x800000000 0x80000000
+	PCIE_HIGH2 0x8000000000 0x4000000000
+}
 
 # Parameters and their defaults. The processing system has the board's preset.
 set parameters(zynq_ultra_ps_e) {
@@ -45,7 +63,7 @@ set parameters(clk_wiz) {
 }
 set parameters(proc_sys_reset) {}
 set parameters(xlconstant) {CONST_WIDTH 1 CONST_VAL 1}
-set parameters(smartconnect) {NUM_SI 2 NUM_MI 1}
+set parameters(smartconnect) {NUM_SI 2 NUM_MI 1 NUM_CLKS 1}
 set parameters(axi_dma) {
 	c_include_sg 1 c_sg_include_stscntrl_strm 1 c_micro_dma 0 c_sg_length_width 14 c_addr_width 32
 	c_include_mm2s 1 c_m_axi_mm2s_data_width 32 c_m_axis_mm2s_tdata_width 32
@@ -54,8 +72,9 @@ set parameters(axi_dma) {
 	c_include_s2mm_dre 0 c_s2mm_burst_size 16
 }
 
-# Pins of a cell: name {direction role bits}. Roles: clock, reset, interrupt, data.
-# Buses of a cell: name {side protocol bits clock}.
+# Pins of a cell: name {direction role bits [clock]}. Roles: clock, reset, interrupt, data. A reset without a clock
+# belongs to all clocks of its cell.
+# Buses of a cell: name {side protocol bits clocks}: one of these clocks.
 proc shape:zynq_ultra_ps_e {cell} {
 	set pins {pl_resetn0 {out reset 1}}
 	set buses {}
@@ -98,20 +117,25 @@ proc shape:proc_sys_reset {cell} {
 }
 proc shape:smartconnect {cell} {
 	set buses {}
+	# It crosses between its clocks, and takes a reset of any of them.
+	set pins {aclk {in clock 1} aresetn {in reset 1 aclk}}
+	for {set k 1} {$k < [value $cell NUM_CLKS]} {incr k} { dict set pins aclk$k {in clock 1} }
+	set clocks [lsearch -all -inline [dict keys $pins] aclk*]
 	foreach {letter side} {S slave M master} {
 		for {set k 0} {$k < [value $cell NUM_${letter}I]} {incr k} {
 			# It converts widths: 0 stands for any.
-			dict set buses [format %s%02d_AXI $letter $k] [list $side memory 0 aclk]
+			dict set buses [format %s%02d_AXI $letter $k] [list $side memory 0 $clocks]
 		}
 	}
-	return [list {aclk {in clock 1} aresetn {in reset 1}} $buses]
+	return [list $pins $buses]
 }
 proc shape:axi_dma {cell} {
 	set mm2s [value $cell c_m_axi_mm2s_data_width]
 	set s2mm [value $cell c_m_axi_s2mm_data_width]
 	return [list {
 		s_axi_lite_aclk {in clock 1} m_axi_sg_aclk {in clock 1}
-		m_axi_mm2s_aclk {in clock 1} m_axi_s2mm_aclk {in clock 1} axi_resetn {in reset 1}
+		m_axi_mm2s_aclk {in clock 1} m_axi_s2mm_aclk {in clock 1}
+		axi_resetn {in reset 1 s_axi_lite_aclk}
 		mm2s_introut {out interrupt 1} s2mm_introut {out interrupt 1}
 	} [list \
 		S_AXI_LITE {slave memory 32 s_axi_lite_aclk} \
@@ -257,7 +281,8 @@ proc segments {} {
 			axi_dma { dict set segments $name/Reg $name }
 			zynq_ultra_ps_e {
 				regexp {HP(\d)} $bus - k
-				foreach part {DDR_LOW DDR_HIGH LPS_OCM QSPI PCIE_LOW} {
+				foreach {part first -} $::address_map {
+					if {[string match DDR* $part] && $first >= [lindex $::board 1]} continue
 					dict set segments $cell/SAXIGP[expr {$k + 2}]/HP${k}_$part $name
 				}
 			}
@@ -304,7 +329,13 @@ proc arguments {command arguments with_value flags} {
 	return [list $options $rest]
 }
 
-foreach command {create_project create_bd_design update_compile_order close_design open_run wait_on_run} {
+proc create_project args {
+	lassign [arguments create_project $args {-part} {-force}] options
+	if {![dict exists $::boards [dict get $options -part]]} { refuse "no device [dict get $options -part]" }
+	set ::board [dict get $::boards [dict get $options -part]]
+}
+proc version args { return [expr {[info exists ::env(MOCK_VERSION)] ? $::env(MOCK_VERSION) : "2024.1"}] }
+foreach command {create_bd_design update_compile_order close_design open_run wait_on_run} {
 	proc $command args "lappend ::done $command"
 }
 foreach command {current_project current_fileset get_runs get_files} {
@@ -312,7 +343,7 @@ foreach command {current_project current_fileset get_runs get_files} {
 }
 foreach command {
 	report_timing_summary report_high_fanout_nets report_utilization report_ram_utilization
-	report_methodology write_hw_platform
+	report_methodology report_cdc write_hw_platform
 } {
 	proc $command args "
 		lassign \[arguments $command \$args {-file -max_paths -max_nets} \
@@ -321,7 +352,10 @@ foreach command {
 		close \[open \[dict get \$options -file\] w\]
 	"
 }
-proc get_board_parts args { return {xilinx.com:zcu102:part0:3.3 xilinx.com:zcu102:part0:3.4} }
+proc get_board_parts args {
+	set name [lindex $::board 0]
+	return [lsearch -all -inline "xilinx.com:$name:part0:1.9 xilinx.com:$name:part0:1.10" [lindex $args end]]
+}
 proc get_ipdefs args {
 	if {![regexp {ip:(\w+):} [lindex $args end] - name] || ![info exists ::parameters($name)]} { return {} }
 	return xilinx.com:ip:$name:1.0
@@ -359,6 +393,9 @@ proc set_property args {
 		set properties [list $name $value]
 	}
 	foreach {name value} $properties {
+		if {$name eq "board_part" && $value ne "xilinx.com:[lindex $::board 0]:part0:1.10"} {
+			refuse "$value is not the newest of the board files"
+		}
 		if {![regsub {^CONFIG\.} $name {} name]} continue
 		if {![info exists config($cell,$name)]} { refuse "$cells($cell) has no parameter $name ($cell)" }
 		set config($cell,$name) $value
@@ -391,10 +428,11 @@ proc get_bd_addr_spaces name {
 	if {![dict exists [spaces] $name]} { refuse "no address space $name" }
 	return $name
 }
-# The segments of this name; with -of_objects, the ones that are assigned in an address space.
+# The segments of this name, from the root of the design on; with -of_objects, the ones that are assigned in an
+# address space.
 proc get_bd_addr_segs args {
 	lassign [arguments get_bd_addr_segs $args {-of_objects} {}] options pattern
-	if {![dict exists $options -of_objects]} { return [dict keys [segments] $pattern] }
+	if {![dict exists $options -of_objects]} { return [lmap name [dict keys [segments] $pattern] { string cat / $name }] }
 	set space [dict get $options -of_objects]
 	return [lsort [lsearch -all -inline -index 0 -exact [array names ::assigned] $space]]
 }
@@ -435,13 +473,21 @@ proc connect_bd_intf_net {a b} {
 proc assign_bd_address args {
 	global assigned
 	lassign [arguments assign_bd_address $args {-offset -range -target_address_space} {}] options segment
+	set segment [string trimleft $segment /]
+	foreach {part first bytes} $::address_map {
+		if {![string match */HP?_$part $segment]} continue
+		set inside [expr {[dict get $options -offset] - $first}]
+		if {$inside < 0 || $inside + [dict get $options -range] > $bytes} {
+			refuse "$segment begins at $first and has $bytes bytes"
+		}
+	}
 	set key [list [dict get $options -target_address_space] $segment]
 	if {[info exists assigned($key)]} { refuse "$key is assigned twice" }
 	set assigned($key) [list [dict get $options -offset] [dict get $options -range]]
 }
 proc exclude_bd_addr_seg args {
 	lassign [arguments exclude_bd_addr_seg $args {-target_address_space} {}] options segment
-	lappend ::excluded [list [dict get $options -target_address_space] $segment]
+	lappend ::excluded [list [dict get $options -target_address_space] [string trimleft $segment /]]
 }
 proc validate_bd_design {} {
 	check
@@ -522,33 +568,44 @@ proc check_connections {} {
 	}
 }
 
-proc clock_of {bus} {
-	return [source_of [lindex [split $bus /] 0]/[lindex [bus $bus] 3]]
+# The sources of the clocks that a bus can run on.
+proc clocks_of {bus} {
+	return [lmap clock [lindex [bus $bus] 3] { source_of [lindex [split $bus /] 0]/$clock }]
 }
 
 # Both ends of a bus run on one clock, and a reset belongs to the clock of its cell.
 proc check_clocks {} {
 	global peer driver cells
 	foreach {a b} [lsort -stride 2 [array get peer]] {
-		if {[clock_of $a] ne [clock_of $b]} { refuse "$a runs on [clock_of $a], $b on [clock_of $b]" }
+		if {![llength [lmap clock [clocks_of $a] { if {$clock ni [clocks_of $b]} continue; set clock }]]} {
+			refuse "$a runs on [clocks_of $a], $b on [clocks_of $b]"
+		}
 	}
 	foreach name [all pins] {
-		lassign [pin $name] direction role
+		lassign [pin $name] direction role - its_clock
 		lassign [split $name /] cell
 		if {$direction ne "in" || $role ne "reset" || $cells($cell) in {clk_wiz proc_sys_reset}} continue
 		set from [lindex [split $driver($name) /] 0]
 		if {$cells($from) ne "proc_sys_reset"} { refuse "$name is reset by $driver($name), which no clock has seen" }
 		set clock [source_of $from/slowest_sync_clk]
 		foreach {other facts} [lindex [shape $cell] 0] {
-			if {[lrange $facts 0 1] eq "in clock" && [source_of $cell/$other] ne $clock} {
+			if {[lrange $facts 0 1] eq "in clock" && $its_clock in [list {} $other] && [source_of $cell/$other] ne $clock} {
 				refuse "$name has the reset of $clock, $cell/$other is on [source_of $cell/$other]"
 			}
 		}
 	}
 	foreach cell [cells_of proc_sys_reset] {
-		set wizard [lindex [split [source_of $cell/slowest_sync_clk] /] 0]
+		set wizard [cells_of clk_wiz]
 		if {[source_of $cell/dcm_locked] ne "$wizard/locked"} { refuse "$cell does not wait until $wizard is locked" }
 	}
+	# The synchronous mode of PG021: one clock, and a slower one for the registers.
+	foreach core [cells_of axi_dma] {
+		foreach pin {m_axi_sg_aclk m_axi_mm2s_aclk m_axi_s2mm_aclk} {
+			set source [source_of $core/$pin]
+			if {$source ne [source_of [accelerator]/aclk]} { refuse "$core/$pin is on $source" }
+		}
+	}
+	if {$::expected_khz < 1000 * $::pgs(pl_clock_mhz)} { refuse "the registers of the DMA cores are on the faster clock" }
 }
 
 proc accelerator {} {
@@ -599,7 +656,12 @@ proc check_interrupt {} {
 	if {![regexp "assign\\s+$output\\s*=(\[^;\]*);" $text - expression]} { refuse "$cells($any): no assign of $output" }
 	set terms [lmap term [split $expression |] { string trim $term }]
 	if {[lsort $terms] ne [lsort $inputs]} { refuse "$cells($any): $output is not the OR of all inputs: $expression" }
-	set sources [lsort [lmap input $inputs { source_of $any/$input }]]
+	# A constant 0 is no source.
+	set sources [lsort [lmap input $inputs {
+		lassign [split [source_of $any/$input] /] cell
+		if {[info exists cells($cell)] && $cells($cell) eq "xlconstant" && [value $cell CONST_VAL] == 0} continue
+		source_of $any/$input
+	}]]
 	set expected [list [accelerator]/irq]
 	foreach core [cells_of axi_dma] { lappend expected $core/mm2s_introut $core/s2mm_introut }
 	if {$sources ne [lsort $expected]} { refuse "interrupts $sources, not [lsort $expected]" }
@@ -685,14 +747,14 @@ proc check_parameters {} {
 		set out [lindex $pgs(s2mm_stream_bits) $k]
 		foreach {name expected} [list c_include_sg 1 c_sg_include_stscntrl_strm 0 c_micro_dma 0 \
 			c_sg_length_width $pgs(dma_length_bits) c_addr_width $pgs(dma_address_bits) \
-			c_include_mm2s 1 c_m_axi_mm2s_data_width $in c_m_axis_mm2s_tdata_width $in c_include_mm2s_dre 0 \
-			c_include_s2mm 1 c_m_axi_s2mm_data_width $out c_s_axis_s2mm_tdata_width $out \
-			c_include_s2mm_dre 0] {
+			c_include_mm2s 1 c_m_axi_mm2s_data_width 128 c_m_axis_mm2s_tdata_width $in c_include_mm2s_dre 0 \
+			c_include_s2mm 1 c_m_axi_s2mm_data_width 128 c_s_axis_s2mm_tdata_width $out \
+			c_include_s2mm_dre 0 c_mm2s_burst_size 16 c_s2mm_burst_size 16] {
 			if {[value $core $name] != $expected} { refuse "$core: $name is [value $core $name], not $expected" }
 		}
 	}
 	set processor [cells_of zynq_ultra_ps_e]
-	foreach port {MAXIGP0 SAXIGP2 SAXIGP3 SAXIGP4 SAXIGP5} {
+	foreach port [lrange {MAXIGP0 SAXIGP2 SAXIGP3 SAXIGP4 SAXIGP5} 0 $k] {
 		set bits [value $processor PSU__${port}__DATA_WIDTH]
 		if {$bits != 128} { refuse "$port has $bits bits; the overlays set the ports to 128" }
 	}

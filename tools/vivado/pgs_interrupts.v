@@ -1,5 +1,5 @@
 // The nine interrupts of the design as one: both channels of the four AXI DMAs, and the accelerator.
-// All are levels, and the status registers tell which source it was.
+// All are levels, of two clocks, and the status registers tell which source it was.
 `default_nettype none
 
 module pgs_interrupts (

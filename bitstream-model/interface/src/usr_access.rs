@@ -13,7 +13,7 @@
 
 /// The upper half of the word.
 pub const MARK: u32 = 0x5047;
-/// The rate of the PL clock 0 of `tools/vivado/zcu102.tcl`, MHz: the input of the MMCM that makes
+/// The rate of the PL clock 0 of `tools/vivado/build.tcl`, MHz: the input of the MMCM that makes
 /// the accelerator's clock.
 pub const PL_CLOCK_MHZ: u32 = 100;
 

@@ -1,8 +1,8 @@
 // Numbers of a step that depend on its arguments alone (specification, section 7): the reciprocal of
 // the time step, the largest angular speed, and the factors of the integration.
 //
-// One divider and one multiplier compute them in READY cycles after `start`. Nothing waits for them:
-// a test of the generator holds the first cycle in which a pipeline can read one against READY.
+// One divider and one multiplier compute them. Nothing waits for them: a test of the generator holds
+// the first cycle in which a pipeline can read one against the cycle in which it is there.
 `default_nettype none
 
 module pgs_constants #(
@@ -14,11 +14,12 @@ module pgs_constants #(
   input  wire [31:0] gravity_x,
   input  wire [31:0] gravity_y,
   input  wire [31:0] gravity_z,
-  output reg  [31:0] per_second,    // 1 / dt
-  output reg  [31:0] speed_limit,   // limit / dt
-  output reg  [31:0] half_step,     // 0.5 * dt
-  output reg  [31:0] series,        // ((dt * dt) * dt) * 0.020833334
-  output reg  [95:0] gravity_step   // g * dt
+  output reg  [31:0] per_second,       // 1 / dt
+  output reg  [31:0] speed_limit,      // limit / dt
+  output reg  [31:0] half_angle_limit, // (speed_limit * dt) * 0.5
+  output reg  [31:0] half_step,        // 0.5 * dt
+  output reg  [31:0] series,           // ((dt * dt) * dt) * 0.020833334
+  output reg  [95:0] gravity_step      // g * dt
 );
 `include "pgs_interface.vh"
 `include "pgs_operators.vh"
@@ -28,6 +29,9 @@ module pgs_constants #(
   localparam [5:0] SQUARE = 6'd0;              // cycle in which dt * dt enters
   localparam [5:0] CUBE   = SQUARE + MULTIPLY + 6'd1;
   localparam [5:0] SERIES = CUBE + MULTIPLY + 6'd1;
+  localparam [5:0] LIMIT  = DIVIDE + 6'd2;     // in which speed_limit is there
+  localparam [5:0] HALF   = LIMIT + MULTIPLY + 6'd1;
+  localparam [5:0] LAST   = HALF + MULTIPLY + 6'd1;
 
   reg [5:0] cycle;
   reg       running;
@@ -37,7 +41,7 @@ module pgs_constants #(
       running <= 1'b1;
     end else if (running) begin
       cycle   <= cycle + 6'd1;
-      running <= cycle != 6'd40;
+      running <= cycle != LAST;
     end
   end
 
@@ -54,6 +58,11 @@ module pgs_constants #(
       6'd3:    a <= gravity_y;
       6'd4:    a <= gravity_z;
       CUBE:    a <= product;
+      LIMIT:   a <= quotient;
+      HALF: begin
+        a <= product;
+        b <= 32'h3f000000;
+      end
       default: begin
         a <= product;
         b <= SOLVER_SERIES_TERM;
@@ -70,7 +79,8 @@ module pgs_constants #(
     if (cycle == 6'd5 + MULTIPLY) gravity_step[95:64] <= product;
     if (cycle == SERIES + MULTIPLY + 6'd1) series     <= product;
     if (cycle == DIVIDE + 6'd1) per_second            <= quotient;
-    if (cycle == DIVIDE + 6'd2) speed_limit           <= quotient;
+    if (cycle == LIMIT) speed_limit                   <= quotient;
+    if (cycle == LAST) half_angle_limit               <= product;
   end
 endmodule
 

@@ -11,7 +11,7 @@
 
 namespace zpgs {
 
-// A call that failed. docs/c.md says for each status what to do.
+// A call that failed. docs/engines.md says for each status what to do.
 class Error : public std::runtime_error {
 public:
     Error(zpgs_status status, const char *text) : std::runtime_error(text), status_(status) {}

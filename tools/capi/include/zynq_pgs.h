@@ -1,6 +1,6 @@
 /* zynq_pgs.h: the C interface of zynq-pgs, driver of an FPGA accelerator for rigid body contacts.
  *
- * cbindgen makes this header from tools/capi/src. docs/c.md has the conventions. It needs C99 or C++11.
+ * cbindgen makes this header from tools/capi/src. docs/engines.md has the conventions. It needs C99 or C++11.
  *
  * - A call returns a zpgs_status; the words of a failure are in zpgs_last_error.
  * - A structure that begins with `size` has sizeof of itself there.

@@ -1,6 +1,6 @@
 //! The C interface of the driver `zynq-pgs`.
 //!
-//! `include/zynq_pgs.h` is made from this crate, and `docs/c.md` has its conventions. Every
+//! `include/zynq_pgs.h` is made from this crate, and `docs/engines.md` has its conventions. Every
 //! exported function returns a [`Status`], and no panic leaves one.
 
 #[cfg(not(target_pointer_width = "64"))]

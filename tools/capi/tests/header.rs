@@ -43,7 +43,7 @@ fn the_committed_header_is_the_one_of_the_sources() {
         fs::write(&file, &fresh).expect("a file in the target folder");
         panic!(
             "the sources make another header: cp {} tools/capi/include/zynq_pgs.h, and look at the \
-             difference (docs/c.md, versions)",
+             difference (docs/engines.md, versions)",
             file.display()
         );
     }

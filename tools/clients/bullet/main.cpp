@@ -16,7 +16,7 @@ const char USAGE_TEXT[] =
     "Runs scenes of Bullet on Bullet's own solver and on the board's, and prints both.\n"
     "Without a scene: all but `spread` and `time`.\n"
     "\n"
-    "  --board TEXT      the board, as in docs/c.md (emulated:float,world)\n"
+    "  --board TEXT      the board, as in docs/engines.md (emulated:float,world)\n"
     "  --iterations N    passes of contact and of friction, 1 to 255, in place of each scene's own\n"
     "  --points N        largest number of points of a collision, 1 to 4 (2)\n"
     "  --reverse N       reverse the order of the collisions every N steps, 0 to 1000 (3; 0 is never)\n"

@@ -1,5 +1,5 @@
 //! The processor's part of a step on a ZCU102, on paper: four Cortex-A53 cores, by the model of
-//! `docs/a53-cost.md`.
+//! `docs/worth.md`.
 
 use serde_json::{Map, Value};
 use zynq_pgs::board::BoardKind;

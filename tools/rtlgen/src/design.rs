@@ -212,7 +212,7 @@ pub struct Design {
     /// Friction passes, likewise.
     pub friction: Pipeline,
     /// Integration, as fast as the streams take results: in `float` a body a cycle, in `half` five
-    /// bodies in four cycles, for which there are five pipelines.
+    /// bodies in four cycles, by five pipelines.
     pub integration: Pipeline,
 }
 
@@ -221,8 +221,8 @@ struct Around {
     /// Between the issue of a collision and cycle 0 of its pipeline, and between the results and
     /// the first issue that sees them: record registers, write registers.
     pass: u32,
-    /// Of a step in which nothing is loaded, passed or integrated, beside the way of the last body
-    /// through the integration.
+    /// The cycles of a step in which nothing is loaded, passed or integrated, beside the way of the
+    /// last body through the integration.
     step: u32,
     /// From a body to the next in one pipeline of the integration.
     interval: u32,
@@ -410,8 +410,10 @@ mod tests {
     /// Nothing waits for the numbers that `step/constants.v` computes while bodies load.
     #[test]
     fn the_constants_of_a_step_are_there_before_a_pipeline_reads_one() {
-        // The slowest one: the second quotient, with registers before and behind the divider.
-        let ready = Operation::Divide.operator(Precision::F32).latency + 4;
+        // The second quotient, with registers before and behind the divider, and two products of it.
+        let latency = |operation: Operation| operation.operator(Precision::F32).latency;
+        let quotient = latency(Operation::Divide) + 4;
+        let half_angle_limit = quotient + 2 * (latency(Operation::Multiply) + 1);
         // One body or pair of them, the set-up, and the registers in front of a pipeline.
         let at_least = 1 + 10 + 2;
         let given = ["time_step", "drift", "coefficient", "friction", "damping"];
@@ -424,6 +426,8 @@ mod tests {
                     let argument = node.kind == Kind::Input(Source::Argument);
                     if argument && !given.contains(&node.name.as_str()) {
                         let at = at_least + schedule.starts[id.index()];
+                        let last = node.name == "half_angle_limit";
+                        let ready = if last { half_angle_limit } else { quotient };
                         assert!(at >= ready, "{} is read at {at}, there at {ready}", node.name);
                         computed += 1;
                     }
@@ -431,8 +435,8 @@ mod tests {
             }
         }
         assert!(
-            computed >= 2 * 7,
-            "per_second, speed_limit, half_step, series and gravity are read"
+            computed >= 2 * 8,
+            "per_second, speed_limit, half_angle_limit, half_step, series and gravity are read"
         );
     }
 }

@@ -59,7 +59,7 @@ impl Operation {
             Self::Multiply => (of(("fmul", 5), ("hmul", 4)), AB, true),
             Self::Divide => (of(("fdiv", 29), ("hdiv", 10)), AB, true),
             Self::SquareRoot => (of(("fsqrt", 27), ("hsqrt", 8)), &["a"], true),
-            Self::SineCosine => (of(("fsincos", 20), ("hsincos", 12)), &["a"], true),
+            Self::SineCosine => (of(("fsincos", 26), ("hsincos", 12)), &["a"], true),
             Self::Maximum => (("fmax", 1), AB, false),
             Self::Minimum => (("fmin", 1), AB, false),
             Self::Less => (("fless", 1), AB, false),

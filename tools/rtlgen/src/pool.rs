@@ -45,8 +45,8 @@ impl Unit {
     }
 }
 
-/// Operands of which a unit's port chooses one at most: as many as two passes have phases. In
-/// `float` these are four, a LUT a bit and one level of logic; in `half` six, two LUTs a bit.
+/// The largest number of operands from which a port of a unit takes one: as many as two passes have
+/// phases. In `float` four, a LUT a bit and one level of logic; in `half` six, two LUTs a bit.
 fn choices(pipelines: &[&Pipeline]) -> usize {
     let phases = pipelines.iter().map(|pipeline| pipeline.schedule.interval).max();
     2 * usize::try_from(phases.unwrap_or(1)).unwrap_or(1)

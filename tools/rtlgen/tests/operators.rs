@@ -80,8 +80,8 @@ const FAULTS: [Fault; 11] = [
     Fault {
         operator: "sincos",
         file: "pgs_fsincos.v",
-        correct: "zs[46*6 +: 46]",
-        wrong: "zs[46*5 +: 46]",
+        correct: "zs[46*8 +: 46]",
+        wrong: "zs[46*7 +: 46]",
     },
     // NaN gives the first operand.
     Fault {

@@ -27,7 +27,7 @@ other body is a cube of 2 m, as in Bullet's demo: a folder says nothing of shape
 2 cm apart collide.
 
 The exit code is 1 if a pair deeper than 1 mm is missing or extra. Normals are the same up to 0.01
-degrees, points up to 1 mm. docs/command-line.md tells where Bullet's have another place, and why.";
+degrees, points up to 1 mm. docs/thesis.md tells where Bullet's have another place, and why.";
 
 /// The experiment.
 pub(crate) static DETECTION: Experiment = Experiment::of::<DetectionArgs>(

@@ -1,4 +1,4 @@
-//! Time of the CPU's part of a step on a Cortex-A53, on paper: `docs/a53-cost.md`.
+//! Time of the CPU's part of a step on a Cortex-A53, on paper: `docs/worth.md`.
 
 /// Bandwidth in bytes per second of a memcpy of 8 MB on one A53 core of another chip (TI SPRADG0A,
 /// AM62P, `bw_mem 8M bcopy`).

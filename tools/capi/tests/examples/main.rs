@@ -50,7 +50,7 @@ fn shared_name() -> String {
     format!("libzynq_pgs_c.so.{}", zynq_pgs_c::ZPGS_ABI_VERSION)
 }
 
-/// Installs the shared library as docs/c.md says; the arguments that link it. The loader looks for
+/// Installs the shared library as docs/engines.md says; the arguments that link it. The loader looks for
 /// the name with the version.
 fn with_shared(folder: &Path, example: Example) -> Vec<OsString> {
     let named = folder.join(shared_name());

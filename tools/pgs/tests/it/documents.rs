@@ -102,7 +102,7 @@ fn the_commands_of_the_documents_print_what_these_show() {
         ("README.md", "solve"),
         ("docs/board.md", "check"),
         ("docs/faults.md", "solve"),
-        ("docs/performance.md", "thesis"),
+        ("docs/worth.md", "thesis"),
     ];
     assert_eq!(verbs, expected, "a new transcript is tested by being named here");
     for Transcript { document, arguments, shown } in transcripts {
@@ -154,7 +154,7 @@ fn the_main_command_prints_what_the_documents_show() {
     assert!(ran.status.success());
     let printed = String::from_utf8(ran.stdout).expect("text");
     let printed = comparable(printed.lines()).join("\n");
-    for document in ["README.md", "docs/performance.md"] {
+    for document in ["README.md", "docs/worth.md"] {
         let text = text(document);
         let blocks = blocks(&text);
         let block = blocks.iter().find(|(_, lines)| {
@@ -221,13 +221,13 @@ fn figures(document: &str) -> Vec<Vec<String>> {
 
 #[test]
 fn the_figures_of_the_readme_are_those_of_the_page_about_performance() {
-    let [readme, page] = ["README.md", "docs/performance.md"].map(figures);
+    let [readme, page] = ["README.md", "docs/worth.md"].map(figures);
     assert_eq!(readme.len(), 8, "the headline figures");
     for row in &readme {
         assert!(page.contains(row), "{row:?}");
     }
     // Where a transcript of a page prints a figure, it is that one.
-    let model = text("docs/performance.md");
+    let model = text("docs/worth.md");
     for cycles in ["2,066,606", "2,093,336", "2,062,697"] {
         assert!(page.iter().any(|row| row[1] == cycles), "{cycles}");
         assert!(model.lines().any(|line| line.starts_with("  float ") && line.contains(cycles)));

@@ -175,7 +175,7 @@ pub(super) const LENGTH_BITS: u32 = 26;
 pub(super) const ADDRESS_BITS: u32 = 40;
 
 /// Bits of an index below `count`.
-fn address_bits(count: u32) -> i64 {
+pub(super) fn address_bits(count: u32) -> i64 {
     i64::from(u32::BITS - count.saturating_sub(1).leading_zeros())
 }
 

@@ -136,7 +136,7 @@ struct Emitter<'a> {
     precision: Precision,
     pipelines: &'a [&'a Pipeline],
     smallest_normal: bool,
-    /// Of each pipeline, by node.
+    /// For each pipeline, by node.
     nets: Vec<Vec<Net>>,
     /// For each value the numbers of intervals after which it is read.
     taps: BTreeMap<Value, BTreeSet<i32>>,
@@ -144,7 +144,7 @@ struct Emitter<'a> {
     copies: RefCell<BTreeSet<(Source, String)>>,
 }
 
-/// What a copy follows.
+/// The port that a copy follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Source {
     Phase(usize),

@@ -11,7 +11,9 @@
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
 //! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
 //! rest it keeps its pose, too. In binary32 the arguments of the sine and of the cosine are the same
-//! number, for a factor of 0.5 is exact; in binary16 it rounds a subnormal number.
+//! number, for a factor of 0.5 is exact, and `half_angle_limit` = (`speed_limit`*dt) * 0.5 comes with
+//! the other numbers, so that the half angle is there in time, whether the body is too fast or not.
+//! In binary16 the factor rounds a subnormal number.
 
 use pgs_interface::number::Precision;
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
@@ -72,11 +74,14 @@ fn output_if<const N: usize>(
 fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
     let [half_step, series, speed_limit] =
         ["half_step", "series", "speed_limit"].map(|name| g.input(Source::Argument, name));
+    let half_angle_limit =
+        (g.precision() == Precision::F32).then(|| g.input(Source::Argument, "half_angle_limit"));
     let square = g.dot(angular, angular);
     let speed = g.square_root(square);
     let limit = g.constant(ROTATION_LIMIT);
     let angle = g.multiply(speed, time_step);
     let too_fast = g.less(limit, angle);
+    let half = g.constant(0.5);
     let speed = g.select(too_fast, speed_limit, speed);
 
     let slow_below = g.constant(SERIES_BELOW);
@@ -85,18 +90,20 @@ fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
     let term = g.multiply(term, speed);
     let by_series = g.subtract(half_step, term);
 
-    let angle = g.multiply(speed, time_step);
-    let half = g.constant(0.5);
-    let half_angle = g.multiply(angle, half);
-    let [_, cosine] = g.sine_cosine(half_angle);
-    let of_sine = match g.precision() {
-        Precision::F32 => half_angle,
-        Precision::Binary16 => {
+    let (of_sine, of_cosine) = match half_angle_limit {
+        Some(limit) => {
+            let half_angle = g.multiply(angle, half);
+            let half_angle = g.select(too_fast, limit, half_angle);
+            (half_angle, half_angle)
+        }
+        None => {
             let half_speed = g.multiply(speed, half);
-            g.multiply(half_speed, time_step)
+            let angle = g.multiply(speed, time_step);
+            (g.multiply(half_speed, time_step), g.multiply(angle, half))
         }
     };
     let [sine, _] = g.sine_cosine(of_sine);
+    let [_, cosine] = g.sine_cosine(of_cosine);
     let by_sine = g.divide(sine, speed);
     let scale = g.select(slow, by_series, by_sine);
     let Vec3([x, y, z]) = g.scale(angular, scale);

@@ -13,7 +13,7 @@ use super::build::BuildArgs;
 /// Writes the accelerator as a folder of Verilog-2001 for a tool.
 ///
 /// The folder has one module a file, the headers that they include, `pgs.f`, the list of the
-/// modules, and `pgs_vivado.tcl`, the numbers that `tools/vivado/zcu102.tcl` reads. The top module
+/// modules, and `pgs_vivado.tcl`, the numbers that `tools/vivado/build.tcl` reads. The top module
 /// is `pgs_top`.
 #[derive(Debug, Args)]
 pub(crate) struct Generate {

@@ -52,7 +52,7 @@ pub static OPERATORS: [Operator; 16] = [
     },
     Operator {
         name: "sincos",
-        latency: 20,
+        latency: 26,
         expected: |v| {
             let (sine, cosine) = reference::sincos(v.argument);
             pair(sine, cosine)

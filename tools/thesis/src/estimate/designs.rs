@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn two_units_of_a_kind_take_nearly_all_lookup_tables_and_three_do_not_fit() {
+    fn by_the_thesis_two_units_of_a_kind_take_nearly_all_lookup_tables_and_three_more() {
         let logic =
             |design: Window, profile: &'static Profile| design.logic(&profile.default_variant()).1;
         assert_eq!(logic(TWO_OF_A_KIND, &WINDOWED), [84, 64, 94]);

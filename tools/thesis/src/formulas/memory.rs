@@ -33,7 +33,7 @@ fn footprint(scene: &Scene) -> Table {
             ("with_positions_mib", "with positions", Cell::Number(mib(more), 2)),
             ("thesis_with_positions_mib", "thesis", thesis_more),
             ("with_positions_difference_percent", "difference", off_more),
-            ("fits", "of 4.0 MiB", text(if memory.fits() { "fits" } else { "does not fit" })),
+            ("within", "within 4.0 MiB", yes_or_no(memory.fits())),
             ("collisions_that_fit", "room for collisions", whole(room)),
         ]]
     });
@@ -88,7 +88,7 @@ fn blocks(scene: &Scene) -> Table {
             ("thesis_percent", "thesis", Cell::known(thesis, Cell::Share)),
             ("ideal_difference_percent", "by bits off", ideal_off),
             ("shaped_difference_percent", "by shape off", shaped_off),
-            ("shaped_fit", "fits by shape", yes_or_no(shaped <= BLOCKS)),
+            ("shaped_within", "within 1,824 by shape", yes_or_no(shaped <= BLOCKS)),
         ]]
     });
     table.note(
@@ -130,7 +130,7 @@ pub(super) fn streams(scene: &Scene) -> Vec<Table> {
         [[
             ("widths", "widths, bits", text(widths.join(" + "))),
             ("ports", "HP ports of 4", whole(demand.ports as u64)),
-            ("fits", "fits", yes_or_no(demand.fits)),
+            ("within", "within the ports", yes_or_no(demand.fits)),
             ("gb_per_second", "GB/s", Cell::Number(demand.rate / 1e9, 2)),
             ("of_peak_percent", "of 17.07", share(Bandwidth::ZCU102_PEAK)),
             ("of_sustained_percent", "of 12.8", share(Bandwidth::ZCU102_SUSTAINED)),

@@ -103,7 +103,7 @@ fn world_inertia(scene: &Scene) -> Table {
             ("difference_percent", "difference", difference(with as f64, without as f64)),
             ("mib_without", "MiB on chip", Cell::Number(mib(memory_without.block_ram()), 2)),
             ("mib_with", "with it", Cell::Number(mib(memory_with.block_ram()), 2)),
-            ("fit", "fits", yes_or_no(memory_with.fits())),
+            ("within", "within 4.0 MiB", yes_or_no(memory_with.fits())),
         ]]
     })
 }

@@ -4,7 +4,7 @@ use crate::estimate::{MemoryUse, Records, StepCycles, StepTime, StepTraffic, Win
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::{FLOAT, Variant};
 
-use super::scene::{Scene, mib, whole, yes_or_no};
+use super::scene::{Scene, mib, whole};
 use crate::table::{Cell, Kind, Table, text};
 
 /// The tables, if one of these designs is among the profiles.
@@ -109,7 +109,7 @@ fn logic(scene: &Scene) -> Table {
                 ("dsp", "DSP", dsp),
                 ("flip_flops", "flip-flops", flip_flops),
                 ("lookup_tables", "lookup tables", lookup_tables),
-                ("fits", "fits", yes_or_no(logic.iter().all(|percent| *percent <= 100))),
+                ("fits", "fits", text("not counted")),
             ]
         })
     });
@@ -118,15 +118,15 @@ fn logic(scene: &Scene) -> Table {
         let (_, [.., lookup_tables]) = design.logic(variant);
         table.note(format!(
             "{}: {} % of the lookup tables are left for places, scoreboard, delay lines and DMAs, \
-             which this table does not count. Only a synthesis can tell whether that is enough, \
-             and whether it closes timing.",
+             which this table does not count.",
             variant.profile.name,
             100 - lookup_tables
         ));
     }
     table.note(
-        "An extrapolation, without a synthesis: the thesis' design in the same arithmetic has one \
-         unit of each kind, and its logic is multiplied by the number of units.",
+        "An extrapolation: the thesis' design in the same arithmetic has one unit of each kind, \
+         and its logic is multiplied by the number of units. Whether a design fits is said of \
+         Verilog whose cells were counted, and these designs have none.",
     );
     table
 }
