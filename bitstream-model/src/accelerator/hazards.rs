@@ -158,6 +158,13 @@ impl Pipeline {
         self.put(WriteBack::default());
     }
 
+    /// Unchecked: slots pass in which nothing enters.
+    pub(super) fn pass_slots(&mut self, slots: u64) {
+        for _ in 0..slots * self.per_issue {
+            self.issue_padding();
+        }
+    }
+
     fn put(&mut self, write_back: WriteBack) {
         let at = index(self.collisions % self.under_way.len() as u64);
         self.under_way[at] = write_back;

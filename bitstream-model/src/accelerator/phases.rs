@@ -148,14 +148,13 @@ impl Accelerator {
         })
     }
 
-    /// Cycles between two issues of a pass: longer records may take their streams longer.
-    pub(crate) fn interval(&self, pass: u32) -> u64 {
-        let profile = self.variant.profile;
-        let of_streams = match self.arguments.is_warm(pass) {
-            true => self.collisions_in(pass).cycles_of(profile.collisions_per_issue as usize),
+    /// Cycles for which the records of an issue of a warm pass take their streams; 0 of another one.
+    pub(crate) fn of_streams(&self, pass: u32) -> u64 {
+        let together = self.variant.profile.collisions_per_issue as usize;
+        match self.arguments.is_warm(pass) {
+            true => self.collisions_in(pass).cycles_of(together),
             false => 0,
-        };
-        u64::from(profile.initiation_interval).max(of_streams)
+        }
     }
 
     fn start_pass(&mut self, number: u32) {
@@ -255,15 +254,22 @@ impl Accelerator {
         let per_issue = profile.collisions_per_issue as usize;
         let warm = self.arguments.is_warm(number);
         let sends = self.arguments.sends_impulses(number);
-        let interval = self.interval(number);
-        let mut cycles = 0;
-        let mut records = 0;
+        let of_streams = self.of_streams(number);
+        let (mut cycles, mut records) = (0, 0);
         let mut reader = segment.reader(0, inputs);
         let mut together = std::mem::take(&mut self.warm_issue);
         together.clear();
         while records < available && cycles <= limit {
             let issue = (available - records).min(per_issue);
             let first = segment.done + records;
+            let issued = (first / per_issue) as u64;
+            let at = profile.issue_at(issued, of_streams);
+            // The slots in front of the issue that stay empty.
+            let empty = at - profile.issues_take(issued, of_streams);
+            cycles += empty;
+            if self.config.hazards == Hazards::Unchecked {
+                self.pipeline.pass_slots(empty / u64::from(profile.initiation_interval));
+            }
             if warm {
                 self.read_warm_issue(&mut reader, &mut together);
             }
@@ -281,7 +287,7 @@ impl Accelerator {
                     self.send_impulses(number, index, &collision, outputs);
                 }
             }
-            cycles += interval;
+            cycles += profile.issues_take(issued + 1, of_streams) - at;
             records += issue;
         }
         self.warm_issue = together;
@@ -316,7 +322,8 @@ impl Accelerator {
     ) -> Result<u64, PacketError> {
         let PassInput { number, segment, records: arrived, limit, inputs, outputs } = input;
         let sends = self.arguments.sends_impulses(number);
-        let interval = self.interval(number);
+        // A queue is in front of slots alone, whose records take their streams no longer.
+        let interval = u64::from(self.variant.profile.initiation_interval);
         let (mut cycles, mut entered) = (0, 0);
         let mut reader = (arrived > 0).then(|| segment.reader(0, inputs));
         loop {

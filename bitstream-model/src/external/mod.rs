@@ -73,13 +73,13 @@ pub enum ExternalError {
         /// The operating system's reason.
         source: std::io::Error,
     },
-    /// The generator makes no accelerator of the board's profile.
-    #[error("the generated accelerator is of profile {generated}, not {asked}")]
+    /// It was built for another profile.
+    #[error("the simulator is built for profile {simulator}, and the board for {board}")]
     Profile {
-        /// The profile of every generated accelerator.
-        generated: &'static str,
-        /// The board's profile.
-        asked: &'static str,
+        /// The simulator's profile.
+        simulator: &'static str,
+        /// The board's.
+        board: &'static str,
     },
     /// It was built for another treatment of hazards.
     #[error("the simulator is built {simulator}, and the board {board}")]

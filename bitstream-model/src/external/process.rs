@@ -32,10 +32,10 @@ use pgs_support::Process;
 use super::{Clocked, ExternalAccelerator, ExternalError, Offer, StreamBeat};
 use crate::config::{BoardConfig, Hazards};
 use pgs_interface::control::{
-    FEATURES, FENCE_BASE, FENCE_SIZE, IDENTIFICATION, IDENTIFICATION_VALUE, features,
+    FEATURES, FENCE_BASE, FENCE_SIZE, IDENTIFICATION, IDENTIFICATION_VALUE, PROFILE, features,
 };
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::{FLOAT, Inertia};
+use pgs_interface::profile::{Inertia, Profile};
 use pgs_interface::record::Beat;
 
 pub(super) const STREAMS: usize = 4;
@@ -83,15 +83,16 @@ impl SimulatorProcess {
     /// has the fence that the simulator reports.
     ///
     /// # Errors
-    /// [`ExternalError::Profile`] for a profile that is not generated, [`ExternalError::Hazards`]
-    /// and [`ExternalError::Inertia`] for a simulator that treats hazards in another way or was
-    /// built for another form of inertia; else as for [`start`](Self::start).
+    /// [`ExternalError::Profile`], [`ExternalError::Hazards`] and [`ExternalError::Inertia`] for a
+    /// simulator of another profile, that treats hazards in another way, or was built for another
+    /// form of inertia; else as for [`start`](Self::start).
     pub fn start_for(config: &mut BoardConfig, path: &Path) -> Result<Self, ExternalError> {
-        if config.profile != &FLOAT {
-            let (generated, asked) = (FLOAT.name, config.profile.name);
-            return Err(ExternalError::Profile { generated, asked });
-        }
         let mut simulator = Self::start(path)?;
+        let profile = simulator.read(PROFILE.offset)?;
+        if profile != config.profile.id {
+            let simulator = Profile::by_id(profile).map_or("unknown", |profile| profile.name);
+            return Err(ExternalError::Profile { simulator, board: config.profile.name });
+        }
         let features = simulator.read(FEATURES.offset)?;
         let interlocked = features::INTERLOCKED.is_set(features);
         if interlocked != (config.hazards == Hazards::Interlocked) {

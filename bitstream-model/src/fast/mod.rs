@@ -304,7 +304,8 @@ impl Fast {
         for pass in 0..accelerator.arguments.passes() {
             let segment = accelerator.collisions_in(pass);
             let depth = accelerator.depth(pass);
-            let interval = accelerator.interval(pass);
+            let (interval, of_streams) =
+                (u64::from(profile.initiation_interval), accelerator.of_streams(pass));
             let mut writes = none;
             if accelerator.arguments.sends_impulses(pass) {
                 writes[IMPULSES_STREAM] = accelerator.impulse_beats();
@@ -318,19 +319,19 @@ impl Fast {
                 parts.push(Part { reads, writes, work, fill });
                 continue;
             }
-            let of = (u64::from(depth.window), interval);
+            let of = (u64::from(depth.window), of_streams);
             let known =
                 self.counted.iter().find(|(kind, _)| *kind == of).map(|(_, stalls)| *stalls);
             let found = known.unwrap_or_else(|| {
-                let of = (of.0, of.1, together);
-                stalls(&mut self.pipeline, bodies, of, &self.entries)
+                let at = |issue| profile.issue_at(issue, of_streams);
+                stalls(&mut self.pipeline, bodies, (of.0, together), at, &self.entries)
             });
             if known.is_none() {
                 self.counted.push((of, found));
             }
             counters.stalls += found.cycles;
             counters.hazards += found.collisions;
-            let work = issues * interval + found.cycles;
+            let work = profile.issues_take(issues, of_streams) + found.cycles;
             parts.push(Part { reads, writes, work, fill });
         }
         let (poses, results) = (accelerator.poses_in(), accelerator.results_out());

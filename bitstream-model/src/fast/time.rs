@@ -108,13 +108,15 @@ pub(super) struct Stalls {
 pub(super) fn stalls(
     pipeline: &mut Pipeline,
     bodies: usize,
-    (window, interval, together): (u64, u64, usize),
+    (window, together): (u64, usize),
+    issue_at: impl Fn(u64) -> u64,
     entries: &[Option<Entry>],
 ) -> Stalls {
     pipeline.start_step(bodies);
     pipeline.start_pass(window);
-    let (mut now, mut stalls) = (0, Stalls::default());
-    for issue in entries.chunks(together) {
+    let mut stalls = Stalls::default();
+    for (number, issue) in (0..).zip(entries.chunks(together)) {
+        let mut now = issue_at(number) + stalls.cycles;
         for entry in issue.iter().flatten() {
             let stall = pipeline.wait(now, entry);
             now += stall;
@@ -122,7 +124,6 @@ pub(super) fn stalls(
             stalls.cycles += stall;
             stalls.collisions += u64::from(stall > 0);
         }
-        now += interval;
     }
     stalls
 }
@@ -173,7 +174,7 @@ mod tests {
         let mut pipeline = Pipeline::new(config.hazards, 2, 1);
         let entry = |bodies| Some(Entry { bodies, moving: [true; 2] });
         let entries = [entry([0, 1]), None, entry([1, 2]), entry([0, 3])];
-        let found = stalls(&mut pipeline, 4, (10, 2, 1), &entries);
+        let found = stalls(&mut pipeline, 4, (10, 1), |issue| 2 * issue, &entries);
         // The third may enter 10 cycles after the first; the fourth then finds body 0 written.
         assert_eq!(found, Stalls { cycles: 6, collisions: 1 });
     }

@@ -181,7 +181,7 @@ impl Step {
         let warm = |passes: u32| match passes {
             0 => 0,
             _ if self.impulses.is_empty() => 0,
-            _ => issues * warm_interval(variant),
+            _ => profile.issues_take(issues, warm_interval(variant)),
         };
         let passes: u64 = self
             .iterations
@@ -198,15 +198,14 @@ impl Step {
     }
 }
 
-/// Cycles from one issue of a warm pass to the next.
+/// Cycles for which the records of an issue of a warm pass take their streams.
 fn warm_interval(variant: &Variant) -> u64 {
     let Variant { profile, numbers, .. } = *variant;
     let rows = profile.collisions_per_issue as usize * collision::WARM_ROWS;
     let issue = beats(numbers.collisions, &vec![[0; 4]; rows]);
     let stripe = profile.stripes.warm_collisions.expect("a stripe");
     let dealt = deal(&stripe, profile.mm2s_widths.len(), issue);
-    let of_streams = slowest(&dealt.iter().map(Vec::len).collect::<Vec<_>>(), profile.mm2s_widths);
-    of_streams.max(profile.initiation_interval.into())
+    slowest(&dealt.iter().map(Vec::len).collect::<Vec<_>>(), profile.mm2s_widths)
 }
 
 /// Cycles of the slowest stream, with the beats and the width of each.

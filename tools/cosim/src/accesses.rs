@@ -5,7 +5,7 @@ use bitstream_model::external::{ExternalAccelerator, ExternalError, Offer};
 use pgs_interface::control::{
     AP_CTRL, GIE, IER, ISR, REGISTERS, RESET, SHAPE_STRIDE, SHAPE_TABLE, ap_ctrl, reset,
 };
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::Variant;
 use pgs_interface::register::Access;
 use pgs_support::random::SplitMix64;
 
@@ -25,11 +25,11 @@ const CLOCKS_MAX: u64 = 10_000_000;
 /// The difference, or an accelerator that does not answer.
 pub fn run(
     both: &mut dyn ExternalAccelerator,
-    inertia: Inertia,
+    variant: Variant,
     seed: u64,
 ) -> Result<bool, ExternalError> {
     let mut random = SplitMix64::new(seed);
-    let case = case(seed, inertia);
+    let case = case(seed, variant);
     let beats = packets(&case.scene, case.fault);
     outcome::reset(both)?;
     for _ in 0..random.word_below(AT_REST) {

@@ -5,7 +5,7 @@
 
 use bitstream_model::external::{ExternalAccelerator, ExternalError};
 use pgs_interface::control::{AP_CTRL, ap_ctrl};
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::Variant;
 
 use crate::outcome::{self, Arrival, Feed, Outcome, difference};
 use crate::packets::{Beats, packets};
@@ -20,8 +20,8 @@ const BODIES: usize = 500;
 const HELD_CLOCKS: u64 = 50_000;
 
 /// The step of a seed, with its bodies and collisions over and over; always another pair of bodies.
-fn scene(seed: u64, inertia: Inertia, warm_start: bool) -> Scene {
-    let mut scene = random::case(seed, inertia).scene;
+fn scene(seed: u64, variant: Variant, warm_start: bool) -> Scene {
+    let mut scene = random::case(seed, variant).scene;
     scene.bodies = scene.bodies.iter().cycle().take(BODIES).copied().collect();
     scene.collisions = scene.collisions.iter().cycle().take(COLLISIONS).copied().collect();
     for body in scene.bodies.iter_mut().step_by(2) {
@@ -64,12 +64,12 @@ fn run(
 /// # Errors
 /// An accelerator does not answer.
 pub fn first_difference(
-    inertia: Inertia,
+    variant: Variant,
     model: &mut dyn ExternalAccelerator,
     rtl: &mut dyn ExternalAccelerator,
 ) -> Result<Option<String>, ExternalError> {
     for (seed, warm_start) in [(2, true), (4, false)] {
-        let scene = scene(seed, inertia, warm_start);
+        let scene = scene(seed, variant, warm_start);
         let beats = packets(&scene, None);
         let model = run(model, &scene, &beats)?;
         let rtl = run(rtl, &scene, &beats)?;

@@ -22,7 +22,7 @@ use cosim::refusal::{Refusal, refusals};
 use cosim::scene::Scene;
 use cosim::{full, random, recorded};
 use pgs_interface::control::{BODY_CAPACITY, COLLISION_CAPACITY, QUEUE, error};
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{FLOAT, HALF, Inertia, Profile, Variant};
 use pgs_interface::register::Register;
 use rtlgen::design::{Design, Parameters};
 use rtlgen::emit::{self, File};
@@ -83,12 +83,33 @@ impl From<InertiaForm> for Inertia {
     }
 }
 
+/// The profiles that have Verilog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ProfileName {
+    /// f32.
+    Float,
+    /// binary16.
+    Half,
+}
+
+impl ProfileName {
+    fn profile(self) -> &'static Profile {
+        match self {
+            Self::Float => &FLOAT,
+            Self::Half => &HALF,
+        }
+    }
+}
+
 /// The build of the hardware.
 #[derive(Debug, Clone, Copy, clap::Args)]
 struct BuildArgs {
     /// The treatment of hazards for which it was built
     #[arg(long, value_enum, default_value_t = HazardMode::Interlocked)]
     hazards: HazardMode,
+    /// The profile for which it was built
+    #[arg(long, value_enum, default_value_t = ProfileName::Float)]
+    profile: ProfileName,
     /// The inertia for which it was built
     #[arg(long, value_enum, default_value_t = InertiaForm::Isotropic)]
     inertia: InertiaForm,
@@ -104,9 +125,9 @@ impl BuildArgs {
             HazardMode::Interlocked => Hazards::Interlocked,
             HazardMode::Unchecked => Hazards::Unchecked,
         };
-        let inertia = self.inertia.into();
-        let fence = Some(Parameters::with(inertia).memory);
-        BoardConfig { hazards, inertia, fence, queue: self.queue, ..Default::default() }
+        let (profile, inertia) = (self.profile.profile(), self.inertia.into());
+        let fence = Some(Parameters::of(profile, inertia).memory);
+        BoardConfig { profile, hazards, inertia, fence, queue: self.queue, ..Default::default() }
     }
 }
 
@@ -240,7 +261,7 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
             let mut both = LockStep::new(&simulator.build.config(), Box::new(rtl), None)?;
             for seed in *seed..*seed + *cases {
                 let difference =
-                    match accesses::run(&mut both, simulator.build.inertia.into(), seed) {
+                    match accesses::run(&mut both, simulator.build.config().variant(), seed) {
                         Ok(true) => continue,
                         Ok(false) => "neither ends the step".to_owned(),
                         Err(ExternalError::Difference(difference)) => difference.to_string(),
@@ -256,8 +277,8 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
             true
         }
         Verb::Full { simulator } => {
-            let Bench { inertia, mut model, mut rtl, .. } = Bench::new(simulator)?;
-            let difference = full::first_difference(inertia, &mut *model, &mut *rtl)?;
+            let Bench { variant, mut model, mut rtl, .. } = Bench::new(simulator)?;
+            let difference = full::first_difference(variant, &mut *model, &mut *rtl)?;
             let text = difference.as_deref().unwrap_or("the model's outcomes with full streams");
             writeln!(out, "{text}")?;
             difference.is_none()
@@ -278,7 +299,7 @@ fn act(verb: &Verb, out: &mut dyn Write) -> Result<ExitCode, Failure> {
 
 /// The Verilog and the model side by side.
 struct Bench {
-    inertia: Inertia,
+    variant: Variant,
     arrival: Arrival,
     rtl: Box<dyn ExternalAccelerator>,
     model: Box<dyn ExternalAccelerator>,
@@ -292,8 +313,8 @@ impl Bench {
         let arrival = if steady { Arrival::Steady } else { Arrival::Disturbed };
         let config = build.config();
         let model = ModelAccelerator::new(&config)?;
-        let inertia = config.inertia;
-        Ok(Self { inertia, arrival, rtl: Box::new(rtl), model: Box::new(model) })
+        let variant = config.variant();
+        Ok(Self { variant, arrival, rtl: Box::new(rtl), model: Box::new(model) })
     }
 
     fn has_queue(&mut self) -> Result<bool, ExternalError> {
@@ -317,10 +338,11 @@ fn run_recorded(
     let mut good = true;
     for path in folders {
         let folder = Folder::load(path)?;
-        let mut scene = recorded::scene(&folder, bench.inertia);
+        let mut scene = recorded::scene(&folder, bench.variant);
         let [rtl, model] = bench.outcomes(&scene)?;
         let name = path.file_name().map_or(Path::new("."), Path::new).display();
-        if args.build.hazards == HazardMode::Interlocked {
+        if (args.build.hazards, args.build.profile) == (HazardMode::Interlocked, ProfileName::Float)
+        {
             let (differ, all) = recorded::differences(&folder, &rtl)?;
             writeln!(out, "{name}: {differ} of {all} recorded values differ")?;
             good &= differ == 0;
@@ -361,7 +383,7 @@ fn counters(rtl: &Outcome, model: &Outcome) -> String {
 /// The first random step on which the Verilog and the model differ.
 fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<String>, Failure> {
     for seed in seed..seed + cases {
-        let case = random::case(seed, bench.inertia);
+        let case = random::case(seed, bench.variant);
         let beats = packets(&case.scene, case.fault);
         let model = outcome::run(&mut *bench.model, &case.scene, &beats)?;
         let rtl = outcome::run(&mut *bench.rtl, &case.scene, &beats)?;
@@ -376,7 +398,7 @@ fn first_difference(bench: &mut Bench, seed: u64, cases: u64) -> Result<Option<S
 fn run_crowded(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure> {
     let mut bench = Bench::new(args)?;
     let mut good = true;
-    for (name, scene) in crowded::scenes(bench.inertia) {
+    for (name, scene) in crowded::scenes(bench.variant) {
         let [rtl, model] = bench.outcomes(&scene)?;
         writeln!(out, "{name}: {}", counters(&rtl, &model))?;
         if let Some(difference) = difference(&model, &rtl, bench.arrival) {
@@ -390,11 +412,11 @@ fn run_crowded(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failur
 /// Whether the Verilog reports each error as the model does.
 fn run_errors(args: &SimulatorArgs, out: &mut dyn Write) -> Result<bool, Failure> {
     let mut bench = Bench::new(args)?;
-    let inertia = bench.inertia;
+    let variant = bench.variant;
     let mut larger = |register: Register| -> Result<u32, Failure> {
         Ok(bench.model.read(register.offset)?.max(bench.rtl.read(register.offset)?))
     };
-    let all = refusals(inertia, larger(BODY_CAPACITY)?, larger(COLLISION_CAPACITY)?);
+    let all = refusals(variant, larger(BODY_CAPACITY)?, larger(COLLISION_CAPACITY)?);
     let mut good = true;
     writeln!(out, "{:31} {:>4}  {:27} {:27}", "mistake", "code", "model", "hardware")?;
     for Refusal { name, code, scene, fault, registers } in all {
@@ -461,7 +483,12 @@ fn difference_of(
     let folder = tempfile::tempdir()?;
     let mut args = SimulatorArgs {
         simulator: simulator::build_files(files, folder.path(), Waveform::None)?,
-        build: BuildArgs { hazards: HazardMode::Interlocked, inertia, queue: Some(MUTANTS_QUEUE) },
+        build: BuildArgs {
+            hazards: HazardMode::Interlocked,
+            profile: ProfileName::Float,
+            inertia,
+            queue: Some(MUTANTS_QUEUE),
+        },
         gaps: 0,
         stalls: 0,
     };
@@ -469,12 +496,12 @@ fn difference_of(
     if let Some(found) = first_difference(&mut bench, 1, cases)? {
         return Ok(Some(found));
     }
-    let [rtl, model] = bench.outcomes(&crowded::starving(bench.inertia))?;
+    let [rtl, model] = bench.outcomes(&crowded::starving(bench.variant))?;
     if let Some(found) = difference(&model, &rtl, bench.arrival) {
         return Ok(Some(format!("a starving pair: {found}")));
     }
     // Without hazards the issue soon waits for a stream that lags behind the others.
     args.gaps = 300;
     let mut bench = Bench::new(&args)?;
-    Ok(full::first_difference(bench.inertia, &mut *bench.model, &mut *bench.rtl)?)
+    Ok(full::first_difference(bench.variant, &mut *bench.model, &mut *bench.rtl)?)
 }

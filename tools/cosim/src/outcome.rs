@@ -3,6 +3,7 @@
 use bitstream_model::external::{
     ExternalAccelerator, ExternalError, Offer, StreamBeat, same_number,
 };
+use half::f16;
 use pgs_interface::control::{
     self, ANGULAR_DAMPING, AP_CTRL, BODIES, COLLISIONS, CONTACT_ITERATIONS, CYCLES_LO, ERROR,
     ERROR_DETAIL, FLAGS, FRICTION, FRICTION_ITERATIONS, GRAVITY_X, GRAVITY_Y, GRAVITY_Z, HAZARDS,
@@ -10,6 +11,7 @@ use pgs_interface::control::{
     SHAPE_STRIDE, SHAPE_TABLE, SPIN_DAMPING, SUM_RECEIVED, SUM_SENT, TIME_STEP, WAIT_CYCLES,
     WORK_CYCLES, ap_ctrl, flags,
 };
+use pgs_interface::number::StreamFormat;
 use pgs_interface::register::Register;
 
 use crate::packets::{Beats, STREAMS};
@@ -29,6 +31,8 @@ const CLOCKS_MAX: u64 = 400_000_000;
 pub struct Outcome {
     /// The beats of each result stream.
     pub results: [Vec<StreamBeat>; STREAMS],
+    /// The format of their words.
+    pub format: StreamFormat,
     /// Beats of impulses and numbers that stream 0 has in front of its results.
     pub impulse_beats: usize,
     /// ERROR and `ERROR_DETAIL`.
@@ -101,6 +105,7 @@ pub(crate) fn finish(
     let mut read = |offset: u32| accelerator.read(offset);
     Ok(Outcome {
         results,
+        format: scene.variant.numbers.poses,
         impulse_beats: scene.impulse_beats(read(QUEUE.offset)? != 0),
         error: [read(ERROR.offset)?, read(ERROR_DETAIL.offset)?],
         ended: !busy,
@@ -220,6 +225,22 @@ pub(crate) fn set_up(
     Ok(())
 }
 
+/// The two numbers of binary16 in a word.
+fn halves(word: u32) -> [f16; 2] {
+    let [a, b, c, d] = word.to_le_bytes();
+    [f16::from_le_bytes([a, b]), f16::from_le_bytes([c, d])]
+}
+
+fn has_nan(word: u32) -> bool {
+    halves(word).iter().any(|number| number.is_nan())
+}
+
+/// Whether two words hold the same numbers of binary16: a NaN equals every other NaN.
+fn same_halves(a: u32, b: u32) -> bool {
+    let same = |(a, b): (f16, f16)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
+    halves(a).into_iter().zip(halves(b)).all(same)
+}
+
 /// How the beats came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
@@ -246,6 +267,7 @@ pub fn difference(expected: &Outcome, found: &Outcome, arrival: Arrival) -> Opti
         return None;
     }
     let mut nan = false;
+    let format = expected.format;
     let impulse_beats = [expected.impulse_beats, 0, 0, 0];
     for (stream, (expected, found)) in expected.results.iter().zip(&found.results).enumerate() {
         if expected.len() != found.len() {
@@ -254,15 +276,19 @@ pub fn difference(expected: &Outcome, found: &Outcome, arrival: Arrival) -> Opti
         }
         for (beat, (expected, found)) in expected.iter().zip(found).enumerate() {
             let place = match beat.checked_sub(impulse_beats[stream]) {
+                Some(number) if format == StreamFormat::Binary16 => {
+                    format!("beat {number} of the results on stream {stream}")
+                }
                 Some(body) => format!("body {body} on stream {stream}"),
                 None => format!("beat {beat} of the impulses"),
             };
             if expected.last != found.last {
                 return differs(&format!("TLAST of {place}"), &expected.last, &found.last);
             }
+            let halves = beat >= impulse_beats[stream] && format == StreamFormat::Binary16;
             for (word, (e, f)) in expected.beat.0.into_iter().zip(found.beat.0).enumerate() {
-                nan |= f32::from_bits(e).is_nan();
-                if !same_number(e, f) {
+                nan |= if halves { has_nan(e) } else { f32::from_bits(e).is_nan() };
+                if !(if halves { same_halves(e, f) } else { same_number(e, f) }) {
                     return differs(&format!("word {word} of {place}"), &e, &f);
                 }
             }

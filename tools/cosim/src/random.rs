@@ -1,7 +1,7 @@
 //! Random scenes of every kind that the interface permits, and of kinds that it refuses.
 
-use pgs_interface::profile::Inertia;
 use pgs_interface::profile::solver::SPIN_DAMPING;
+use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 use pgs_interface::record::collision::{FRICTION_BITS, FRICTION_SHIFT};
 use pgs_support::random::SplitMix64;
@@ -167,7 +167,6 @@ impl Draw {
     /// Inertias about world axes, any numbers. In two steps of three the bodies bring their masses,
     /// and nearly always the same bodies are static as by their shapes.
     fn world(&mut self, scene: &mut Scene) {
-        scene.inertia = Inertia::World;
         scene.arguments.streamed_masses = !self.one_in(3);
         for body in &mut scene.bodies {
             let size = if self.one_in(3) { 0.0 } else { 2.0 };
@@ -218,9 +217,9 @@ impl Draw {
     }
 }
 
-/// A case for an accelerator with that form of inertia; the same for the same seed.
+/// A case for an accelerator; the same for the same seed.
 #[must_use]
-pub fn case(seed: u64, inertia: Inertia) -> Case {
+pub fn case(seed: u64, variant: Variant) -> Case {
     let mut draw = Draw(SplitMix64::new(seed));
     let iterations = |draw: &mut Draw| if draw.one_in(5) { 0 } else { 1 + draw.below(3) };
     let arguments = Arguments {
@@ -250,13 +249,8 @@ pub fn case(seed: u64, inertia: Inertia) -> Case {
     }
     let bodies = if draw.one_in(10) { 1 + draw.below(3) } else { 2 + draw.below(40) };
     let shape_count = u32::try_from(shapes.len()).unwrap_or(1);
-    let mut scene = Scene {
-        inertia: Inertia::Isotropic,
-        shapes,
-        bodies: Vec::new(),
-        collisions: Vec::new(),
-        arguments,
-    };
+    let mut scene =
+        Scene { variant, shapes, bodies: Vec::new(), collisions: Vec::new(), arguments };
     scene.bodies = (0..bodies).map(|_| draw.body(shape_count)).collect();
     // One body at least moves, and a collision needs a second one.
     scene.bodies[0].shape = 0;
@@ -291,7 +285,7 @@ pub fn case(seed: u64, inertia: Inertia) -> Case {
         // So light that J is 0.
         case.scene.shapes[0].inverse_mass = f32::MAX.to_bits();
     }
-    if inertia == Inertia::World {
+    if variant.inertia == Inertia::World {
         draw.world(&mut case.scene);
     }
     case.scene.arguments.in_order = draw.one_in(3);
@@ -309,22 +303,24 @@ pub fn case(seed: u64, inertia: Inertia) -> Case {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pgs_interface::profile::FLOAT;
 
-    const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
+    const WORLD: Variant = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };
+    const FORMS: [Variant; 2] = [FLOAT.default_variant(), WORLD];
 
     #[test]
     fn a_seed_gives_the_same_case_and_another_one_another() {
-        for inertia in FORMS {
-            assert_eq!(case(7, inertia).scene, case(7, inertia).scene);
-            assert_ne!(case(7, inertia).scene, case(8, inertia).scene);
+        for variant in FORMS {
+            assert_eq!(case(7, variant).scene, case(7, variant).scene);
+            assert_ne!(case(7, variant).scene, case(8, variant).scene);
         }
     }
 
     #[test]
     fn every_kind_comes_up() {
-        for inertia in FORMS {
-            let cases: Vec<Case> = (0..400).map(|seed| case(seed, inertia)).collect();
-            assert!(cases.iter().all(|case| case.scene.inertia == inertia));
+        for variant in FORMS {
+            let cases: Vec<Case> = (0..400).map(|seed| case(seed, variant)).collect();
+            assert!(cases.iter().all(|case| case.scene.variant == variant));
             assert!(cases.iter().any(|case| case.fault.is_some()));
             assert!(cases.iter().any(|case| case.scene.collisions.is_empty()));
             assert!(cases.iter().any(|case| case.scene.bodies.len() == 1));
@@ -351,11 +347,11 @@ mod tests {
 
     #[test]
     fn masses_are_streamed_with_world_inertia_alone() {
-        let streams = |inertia| {
-            let streamed = |seed| case(seed, inertia).scene.arguments.streamed_masses;
+        let streams = |variant| {
+            let streamed = |seed| case(seed, variant).scene.arguments.streamed_masses;
             (0..400).filter(|seed| streamed(*seed)).count()
         };
-        assert_eq!(streams(Inertia::Isotropic), 0);
-        assert!((200..350).contains(&streams(Inertia::World)));
+        assert_eq!(streams(FORMS[0]), 0);
+        assert!((200..350).contains(&streams(WORLD)));
     }
 }

@@ -1,6 +1,6 @@
 //! Recorded steps: a folder's scene, and its results as bits.
 
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 use step_folder::folder::{Folder, State};
 use step_folder::npy::{Dimensions, NpyError, read};
@@ -9,11 +9,11 @@ use zynq_pgs::Body as DriverBody;
 use crate::outcome::Outcome;
 use crate::scene::{Arguments, Body, Collision, Scene, Shape};
 
-/// The scene of a folder, in the order of its arrays and past a queue, for an accelerator with that
-/// form of inertia. The shapes of the folder have one moment of inertia about every axis; with
-/// world inertia each body brings it, and its mass.
+/// The scene of a folder, in the order of its arrays and past a queue, for an accelerator. The
+/// shapes of the folder have one moment of inertia about every axis; with world inertia each body
+/// brings it, and its mass.
 #[must_use]
-pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
+pub fn scene(folder: &Folder, variant: Variant) -> Scene {
     let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
     let position = |body: usize| bits(folder.bodies[body].pose.position);
     let shapes = folder.shapes.iter().map(|shape| Shape {
@@ -52,7 +52,7 @@ pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
     });
     let parameters = &folder.parameters;
     Scene {
-        inertia,
+        variant,
         shapes: shapes.collect(),
         bodies: bodies.collect(),
         collisions: collisions.collect(),
@@ -64,7 +64,7 @@ pub fn scene(folder: &Folder, inertia: Inertia) -> Scene {
             pair_friction: parameters.pair_friction,
             warm_start: false,
             impulses_out: parameters.impulses_out,
-            streamed_masses: inertia == Inertia::World,
+            streamed_masses: variant.inertia == Inertia::World,
             in_order: true,
             numbers: [
                 parameters.time_step,

@@ -1,7 +1,7 @@
 //! Steps that the accelerator refuses: for each of its error codes one that leads to it.
 
 use pgs_interface::control::{BODIES, COLLISIONS, CONTACT_ITERATIONS, ErrorCode};
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::register::Register;
 
 use crate::packets::{Fault, FaultAt};
@@ -26,16 +26,16 @@ pub struct Refusal {
 const WRONG: usize = 3;
 
 /// Five bodies in a row, the last one static, and a collision of each with its neighbour.
-fn scene(inertia: Inertia) -> Scene {
-    Scene::row(inertia, 5, (0..4).map(|body| [body + 1, body]))
+fn scene(variant: Variant) -> Scene {
+    Scene::row(variant, 5, (0..4).map(|body| [body + 1, body]))
 }
 
 /// At least one step for each error code of a design that streams the collisions once a pass.
 /// `collisions_max` and `bodies_max` are the larger of the capacities of the accelerators.
 #[must_use]
-pub fn refusals(inertia: Inertia, bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
+pub fn refusals(variant: Variant, bodies_max: u32, collisions_max: u32) -> Vec<Refusal> {
     let plain =
-        |name, code| Refusal { name, code, scene: scene(inertia), fault: None, registers: vec![] };
+        |name, code| Refusal { name, code, scene: scene(variant), fault: None, registers: vec![] };
     let changed = |name, code, change: fn(&mut Scene)| {
         let mut refusal = plain(name, code);
         change(&mut refusal.scene);
@@ -91,7 +91,7 @@ pub fn refusals(inertia: Inertia, bodies_max: u32, collisions_max: u32) -> Vec<R
         warm("no TLAST, friction after warm", ErrorCode::TlastMissing, Fault::NoLast, 6, 3, 0),
         warm("invalid bytes, warm friction", ErrorCode::PartialBeat, Fault::Partial, 4, 3, 5),
     ];
-    if inertia == Inertia::World {
+    if variant.inertia == Inertia::World {
         all.extend([
             changed("two static by their own masses", ErrorCode::StaticPair, |scene| {
                 scene.arguments.streamed_masses = true;
@@ -121,11 +121,13 @@ pub fn refusals(inertia: Inertia, bodies_max: u32, collisions_max: u32) -> Vec<R
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pgs_interface::profile::{FLOAT, HALF};
 
     #[test]
     fn every_code_is_there() {
-        for inertia in [Inertia::Isotropic, Inertia::World] {
-            let all = refusals(inertia, 1, 1);
+        let world = Variant { inertia: Inertia::World, ..FLOAT.default_variant() };
+        for variant in [FLOAT.default_variant(), world, HALF.default_variant()] {
+            let all = refusals(variant, 1, 1);
             for code in ErrorCode::ALL {
                 assert!(all.iter().any(|refusal| refusal.code == code), "{code:?}");
             }

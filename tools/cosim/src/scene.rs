@@ -1,7 +1,8 @@
-//! A step as words, as an accelerator of profile `float` takes it; nothing in it need make sense.
+//! A step as words, as an accelerator takes it; nothing in it need make sense. Numbers are f32: the
+//! packets of another format round them.
 
 use pgs_interface::control::NUMBERS_PER_BEAT;
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{Inertia, Variant};
 use pgs_interface::record::CONTACT_POINTS;
 
 /// An entry of the shape table, as bits of f32.
@@ -81,8 +82,8 @@ pub struct Arguments {
 /// A whole step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scene {
-    /// The form of inertia of the accelerator that takes it.
-    pub inertia: Inertia,
+    /// The accelerator that takes it.
+    pub variant: Variant,
     /// The shape table.
     pub shapes: Vec<Shape>,
     /// All bodies.
@@ -96,7 +97,7 @@ pub struct Scene {
 impl Scene {
     /// Bodies in a row, the last one static, with a collision of each of these pairs.
     #[must_use]
-    pub fn row(inertia: Inertia, bodies: u16, pairs: impl IntoIterator<Item = [u32; 2]>) -> Self {
+    pub fn row(variant: Variant, bodies: u16, pairs: impl IntoIterator<Item = [u32; 2]>) -> Self {
         let one = 1.0_f32.to_bits();
         let moves = Shape { inverse_mass: one, inverse_inertia: one };
         let fixed = Shape { inverse_mass: 0, inverse_inertia: 0 };
@@ -132,12 +133,18 @@ impl Scene {
             gravity: [0, (-9.8_f32).to_bits(), 0],
         };
         Self {
-            inertia,
+            variant,
             shapes: vec![moves, fixed],
             collisions: collisions.collect(),
             bodies,
             arguments,
         }
+    }
+
+    /// Whether velocity records bring the inertia of their bodies.
+    #[must_use]
+    pub fn has_world_inertia(&self) -> bool {
+        self.variant.inertia == Inertia::World
     }
 
     /// Contact passes and friction passes, the warm ones among them.

@@ -14,22 +14,25 @@ use cosim::flaws::{Flawed, Flaws};
 use cosim::packets::packets;
 use cosim::{accesses, outcome, random};
 use pgs_interface::fence::Fence;
-use pgs_interface::profile::Inertia;
+use pgs_interface::profile::{FLOAT, HALF, Inertia, Variant};
 use pgs_interface::record::result;
 use step_folder::folder::Folder;
 use zynq_pgs::{
     Accelerator, BoardChoice, Error, Impulses, OpenOptions, Shape, StepParameters, WarmCollisions,
 };
 
-const FORMS: [Inertia; 2] = [Inertia::Isotropic, Inertia::World];
+const PLAIN: Variant = FLOAT.default_variant();
+const FORMS: [Variant; 3] =
+    [PLAIN, Variant { inertia: Inertia::World, ..PLAIN }, HALF.default_variant()];
 
 fn config() -> BoardConfig {
     let fence = Some(Fence::default());
     BoardConfig { fence, ..BoardConfig::default() }
 }
 
-fn lock_step(inertia: Inertia, flaws: Flaws) -> LockStep {
-    let config = BoardConfig { inertia, ..config() };
+fn lock_step(variant: Variant, flaws: Flaws) -> LockStep {
+    let Variant { profile, inertia, .. } = variant;
+    let config = BoardConfig { profile, inertia, ..config() };
     let model = ModelAccelerator::new(&config).expect("a model");
     LockStep::new(&config, Box::new(Flawed::new(model, flaws)), None).expect("a lock step")
 }
@@ -71,10 +74,10 @@ fn step(board: &EmulatedBoard, folder: &Folder) -> (Option<Error>, bool) {
 
 #[test]
 fn equals_run_random_steps_in_lock_step_without_a_difference() {
-    for inertia in FORMS {
-        let mut both = lock_step(inertia, Flaws::default());
+    for variant in FORMS {
+        let mut both = lock_step(variant, Flaws::default());
         for seed in 1..=100 {
-            let case = random::case(seed, inertia);
+            let case = random::case(seed, variant);
             let beats = packets(&case.scene, case.fault);
             outcome::run(&mut both, &case.scene, &beats).unwrap_or_else(|e| panic!("{seed}: {e}"));
         }
@@ -83,10 +86,10 @@ fn equals_run_random_steps_in_lock_step_without_a_difference() {
 
 #[test]
 fn equals_take_random_register_accesses_alike() {
-    for inertia in FORMS {
-        let mut both = lock_step(inertia, Flaws::default());
+    for variant in FORMS {
+        let mut both = lock_step(variant, Flaws::default());
         for seed in 1..=50 {
-            let ended = accesses::run(&mut both, inertia, seed);
+            let ended = accesses::run(&mut both, variant, seed);
             assert!(ended.unwrap_or_else(|e| panic!("{seed}: {e}")), "{seed}");
         }
     }
@@ -95,8 +98,8 @@ fn equals_take_random_register_accesses_alike() {
 #[test]
 fn a_wrong_word_is_named_with_its_record_and_its_values() {
     let folder = golden("two_cubes");
-    let scene = cosim::recorded::scene(&folder, Inertia::Isotropic);
-    let mut both = lock_step(Inertia::Isotropic, Flaws { wrong: Some(1), ..Flaws::default() });
+    let scene = cosim::recorded::scene(&folder, PLAIN);
+    let mut both = lock_step(PLAIN, Flaws { wrong: Some(1), ..Flaws::default() });
     let error = outcome::run(&mut both, &scene, &packets(&scene, None)).expect_err("a difference");
     let ExternalError::Difference(difference) = error else { panic!("{error}") };
     let Difference { place, cycle, model, hardware, .. } = *difference;
@@ -231,7 +234,7 @@ fn a_simulator_that_dies_or_hangs_in_a_step_is_named_and_the_bodies_stay() {
 #[test]
 fn a_difference_ends_the_step_and_the_bodies_stay() {
     let flaws = Flaws { wrong: Some(1), ..Flaws::default() };
-    let board = board(Box::new(lock_step(Inertia::Isotropic, flaws)));
+    let board = board(Box::new(lock_step(PLAIN, flaws)));
     let (error, untouched) = step(&board, &golden("two_cubes"));
     assert!(error.is_some() && untouched);
     let reason = board.accelerator_error().expect("a reason");

@@ -82,6 +82,9 @@ pub struct Profile {
     pub stripes: Stripes,
     /// Cycles from one issue to the next.
     pub initiation_interval: u32,
+    /// Whether collisions enter in slots of the initiation interval in every pass. Where the records
+    /// of a warm pass take their streams longer, slots stay empty; otherwise the interval is longer.
+    pub slotted: bool,
     /// Collisions that enter the pipeline together. A last issue that is not full is filled up with
     /// padding collisions.
     pub collisions_per_issue: u32,
@@ -124,6 +127,28 @@ impl Profile {
     #[must_use]
     pub fn by_id(id: u32) -> Option<&'static Self> {
         PROFILES.iter().copied().find(|profile| profile.id == id)
+    }
+
+    /// Cycles from the beginning of a pass to an issue, without stalls and waits, where the records
+    /// of an issue take their streams `of_streams` cycles.
+    #[must_use]
+    pub const fn issue_at(&self, issue: u64, of_streams: u64) -> u64 {
+        let interval = self.initiation_interval as u64;
+        let longer = if of_streams > interval { of_streams } else { interval };
+        match self.slotted {
+            true => issue * longer / interval * interval,
+            false => issue * longer,
+        }
+    }
+
+    /// Cycles of a pass of some issues without its fill, stalls and waits, likewise.
+    #[must_use]
+    pub const fn issues_take(&self, issues: u64, of_streams: u64) -> u64 {
+        match (issues, self.slotted) {
+            (0, _) => 0,
+            (_, true) => self.issue_at(issues - 1, of_streams) + self.initiation_interval as u64,
+            (_, false) => self.issue_at(issues, of_streams),
+        }
     }
 
     /// Whether an interlocked build can have an issue queue: collisions leave it one by one.

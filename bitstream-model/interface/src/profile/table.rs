@@ -52,6 +52,7 @@ pub const NAIVE: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0], padded: false }),
     queue: None,
     initiation_interval: 28,
+    slotted: false,
     collisions_per_issue: 1,
     contact: CONTACT,
     friction: FRICTION,
@@ -79,6 +80,7 @@ pub const FLOAT: Profile = Profile {
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 3], padded: false }),
     queue: Some(64),
     initiation_interval: 2,
+    slotted: true,
     collisions_per_issue: 1,
     contact: FLOAT_CONTACT,
     friction: FLOAT_FRICTION,
@@ -106,6 +108,7 @@ pub const HALF: Profile = Profile {
     )
     .with_warm_collisions(Stripe { streams: &[0, 0, 0, 1, 1, 1, 2, 2], padded: true }),
     initiation_interval: 3,
+    slotted: true,
     collisions_per_issue: 2,
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },

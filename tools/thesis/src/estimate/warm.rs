@@ -48,7 +48,7 @@ impl WarmCost {
         let together = u64::from(profile.collisions_per_issue);
         let issues = step.collisions.div_ceil(together);
         let usual = u64::from(profile.initiation_interval);
-        let interval = records(together).cycles.max(usual);
+        let pass = profile.issues_take(issues, records(together).cycles);
         let traffic = StepTraffic::new(variant, Records::Streamed, step);
         let bytes = records(step.collisions).bytes;
         let (mut more_cycles, mut more_in, mut more_out) = (0, 0, 0);
@@ -60,10 +60,8 @@ impl WarmCost {
                 continue;
             }
             let (cycles, bytes) = match way {
-                WarmStart::OwnPass => (issues * interval + u64::from(kind.fill), bytes),
-                WarmStart::FirstPass => {
-                    (issues * (interval - usual), bytes - traffic.collisions.bytes)
-                }
+                WarmStart::OwnPass => (pass + u64::from(kind.fill), bytes),
+                WarmStart::FirstPass => (pass - issues * usual, bytes - traffic.collisions.bytes),
             };
             more_cycles += cycles;
             more_in += bytes;
