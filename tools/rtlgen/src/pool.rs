@@ -45,11 +45,12 @@ impl Unit {
     }
 }
 
-/// Operands of which a unit's port chooses one at most: as many as two passes have phases. In
-/// `float` these are four, a LUT a bit and one level of logic; in `half` six, two LUTs a bit.
+/// Operands of which a unit's port chooses one at most. Two passes of two phases have four, a LUT a
+/// bit and one level of logic; two of three phases, and the integration, seven, three LUTs a bit
+/// and two levels.
 fn choices(pipelines: &[&Pipeline]) -> usize {
     let phases = pipelines.iter().map(|pipeline| pipeline.schedule.interval).max();
-    2 * usize::try_from(phases.unwrap_or(1)).unwrap_or(1)
+    if phases == Some(3) { 7 } else { 4 }
 }
 
 /// The units of some pipelines: a comparison or a selection is as small as the choice between its
