@@ -25,8 +25,10 @@ module pgs_half_shapes #(
   output wire [2:0]         moves,         // of the two properties below, and of the third lookup
   output wire [63:0]        properties     // of bodies B and A, each {inverse inertia, inverse mass}
 );
+`include "pgs_operators.vh"
+
   // An entry waits for its rounding.
-  localparam ROUNDING = 2;
+  localparam ROUNDING = FLOAT_TO_HALF_LATENCY;
   wire [15:0]      rounded;
   wire [1:0]       write_late;
   wire [SHAPE-1:0] address_late;

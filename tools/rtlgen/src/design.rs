@@ -208,7 +208,7 @@ struct Around {
 /// Around a step: set-up in front of the first pass (10), the end of the load (2), the entry into
 /// the integration (1), the result FIFOs and their end (5), the sums and the end (3).
 const AROUND_FLOAT: Around = Around { pass: 8, step: 21 };
-const AROUND_HALF: Around = Around { pass: 9, step: 32 };
+const AROUND_HALF: Around = Around { pass: 9, step: 29 };
 
 impl Parameters {
     fn around(&self) -> &'static Around {

@@ -1,9 +1,9 @@
 //! The table of profiles.
 //!
 //! The thesis gives no pipeline depths. The generated Verilog in `bitstream-model/rtl` gives the
-//! depths of `float` and the fill of its integration, memories included. The other profiles have no
-//! Verilog: their depths are assumed, from an earlier pipeline of two cycles a collision, and so is
-//! their fill of the integration, from `float`.
+//! depths of `float` and of `half` and the fill of their integration, memories included. `naive` has
+//! no Verilog: its depths are assumed, from an earlier pipeline of two cycles a collision, and so is
+//! its fill of the integration, from `float`.
 
 use super::{Depth, OnChipMemory, Profile};
 use crate::number::Numbers;
@@ -18,12 +18,20 @@ const FLOAT_FRICTION: Depth = Depth { fill: 314, window: 190 };
 const FLOAT_WORLD_CONTACT: Depth = Depth { fill: 388, window: 324 };
 const FLOAT_WORLD_FRICTION: Depth = Depth { fill: 328, window: 190 };
 
-/// Pipelines of every other profile: assumptions.
+/// Pipelines of `half`: schedules of the generated Verilog, in whole slots of three cycles.
+const HALF_CONTACT: Depth = Depth { fill: 285, window: 255 };
+const HALF_FRICTION: Depth = Depth { fill: 222, window: 156 };
+
+/// Fill of the integration in the generated Verilog of `half`: 140 cycles of the pipeline, 8 of the
+/// reads before it, and 23 of set-up and control.
+const HALF_INTEGRATION_FILL: u32 = 177;
+
+/// Pipelines of `naive`: assumptions.
 const CONTACT: Depth = Depth { fill: 364, window: 316 };
 const FRICTION: Depth = Depth { fill: 306, window: 182 };
 
 /// Fill of the integration in the generated Verilog of `float`: 237 cycles of the pipeline, 6 of
-/// the read before it, and 21 of set-up and control. An assumption for every other profile.
+/// the read before it, and 21 of set-up and control. An assumption for `naive`.
 const INTEGRATION_FILL: u32 = 264;
 
 /// Block RAM of the XCZU9EG as the thesis counts it, bytes.
@@ -113,7 +121,10 @@ pub const HALF: Profile = Profile {
     clock_khz: 250_000,
     memory: OnChipMemory { velocity_copies: 2, ..ONE_COPY },
     source: "thesis §5.5, §4.4.2",
-    // The pipelines, no queue, the capacities, and that subnormal numbers count.
+    contact: HALF_CONTACT,
+    friction: HALF_FRICTION,
+    integration_fill: HALF_INTEGRATION_FILL,
+    // No queue, the capacities, and that subnormal numbers count.
     ..NAIVE
 };
 
