@@ -3,7 +3,8 @@
 # and with slang. A warning fails it.
 #
 # usage: rtl-lint.sh [OPTION...]     options of `rtlgen generate`, such as --hazards unchecked; without any, the
-#                                    default build, the one with world inertia, and one without an issue queue
+#                                    default build, the one with world inertia, one without an issue queue, and
+#                                    profile `half`
 #
 # Verilator's complaints about constants of the headers that a module does not use are switched off
 # there; no other warning is.
@@ -59,5 +60,6 @@ read_build "$@"
 if [ $# = 0 ]; then
 	read_build --inertia world
 	read_build --queue 0
+	read_build --profile half
 fi
 [ -z "$failed" ] || fail "the Verilog has warnings"

@@ -6,7 +6,8 @@
 #        tools/scripts/rtl-test.sh steps       instead, the driver's whole steps through registers and DMA:
 #                                              all recorded ones, and faults; then 500 random steps against
 #                                              the model, and 500 among register accesses in lock step, with
-#                                              either form of inertia; and 500 with gaps and stalls
+#                                              either form of inertia; and 500 with gaps and stalls; the same
+#                                              500 and 500 with profile `half`
 #        tools/scripts/rtl-test.sh mutations   instead, seeded mistakes in the Verilog: each must be found
 #        tools/scripts/rtl-test.sh --help
 #
@@ -55,7 +56,12 @@ simulations+=($!)
 begin "$built/rtlgen" simulator --out "$folder/world" --inertia world
 simulations+=($!)
 for process in "${simulations[@]}"; do await "$process"; done
+# One after the other: two of these builds at once take too much memory.
+for hazards in interlocked unchecked; do
+	attend "$built/rtlgen" simulator --profile half --out "$folder/half-$hazards" --hazards "$hazards"
+done
 world=$folder/world/pgs-rtl
+half=(--simulator "$folder/half-interlocked/pgs-rtl" --profile half)
 queued=(--simulator "$folder/interlocked/pgs-rtl")
 
 recorded=(tests/golden/*/)
@@ -72,6 +78,9 @@ if [ "$mode" = steps ]; then
 		attend "$built/cosim" registers "${cosim[@]}" --cases 500
 	done
 	attend "$built/cosim" random "${queued[@]}" --cases 500 --seed 6000000 --gaps 300 --stalls 700
+	attend "$built/cosim" random "${half[@]}" --cases 500 --seed 5000000
+	attend "$built/cosim" registers "${half[@]}" --cases 500
+	attend "$built/cosim" random "${half[@]}" --cases 500 --seed 6000000 --gaps 300 --stalls 700
 	# The longest part comes last.
 	attend python3 tools/scripts/rtl_steps.py "$built/pgs" "${simulators[@]}" "${recorded[@]}"
 	exit
@@ -100,6 +109,13 @@ attend "$built/cosim" errors "${cosim[@]}"
 attend "$built/cosim" full "${cosim[@]}"
 attend "$built/cosim" registers "${cosim[@]}" --cases $((cases / 4))
 attend "$built/cosim" random "${cosim[@]}" --cases $((cases / 10)) --seed 1000000 --gaps 300 --stalls 700
+for verb in "recorded ${recorded[*]}" errors full "registers --cases $((cases / 4))" "random --cases $cases" \
+	"random --cases $((cases / 5)) --seed 1000000 --gaps 300 --stalls 700"; do
+	# shellcheck disable=SC2086
+	attend "$built/cosim" $verb "${half[@]}"
+done
+attend "$built/cosim" random --simulator "$folder/half-unchecked/pgs-rtl" --profile half --hazards unchecked \
+	--cases $((cases / 2))
 attend "$built/cosim" crowded "${queued[@]}"
 # Without the interlock the bits depend on the time at which beats come.
 attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $((cases / 5)) --seed 1000000 \
@@ -107,6 +123,8 @@ attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $
 attend "$built/cosim" full --simulator "$folder/interlocked/pgs-rtl" --gaps 300 --stalls 700
 attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated \
 	--accelerator "both:${simulators[0]}"
+attend "$built/pgs" solve tests/golden/pile5_step60 --profile half --board emulated \
+	--accelerator "both:$folder/half-interlocked/pgs-rtl"
 # Impulses of each step come out, and go into the next one.
 attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated \
 	--accelerator "both:${simulators[0]}"

@@ -2,7 +2,7 @@
 //
 //   receivers -> loader ------------------------------------> velocities, 2 copies <-> solvers, one a collision of a pair
 //            \-> finder -> issue -> record registers -> solvers
-//            \-> integrator -> five integration pipelines -> results -> senders
+//            \-> integrator -> solvers: integration -> results -> senders
 //
 // A slot of three cycles carries a pair of collisions, one of them, or nothing, and nothing behind the issue ever
 // stops: no pipeline has a clock enable. The memories of bodies have two banks each, so that five bodies load in two
@@ -106,7 +106,7 @@ module pgs_half_core (
 
   pgs_step_sequence #(
     .INTERVAL(3), .SETUP(SETUP), .CONTACT_FILL(CONTACT_FILL), .FRICTION_FILL(FRICTION_FILL),
-    .FINISH(INTEGRATION_DEPTH + 17)
+    .FINISH(INTEGRATION_DEPTH + 13)
   ) steps (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(pairs), .contact_passes(contact_passes), .friction_passes(friction_passes),

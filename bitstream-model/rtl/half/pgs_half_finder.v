@@ -59,7 +59,7 @@ module pgs_half_finder #(
     count_of = (|word[15:3]) ? 3'd7 : word[2:0];
   endfunction
   function [BODY:0] body_of(input [15:0] word);
-    body_of = {|(word >> BODY), word[BODY-1:0]};
+    body_of = {|({16'd0, word} >> BODY), word[BODY-1:0]};
   endfunction
   wire [2:0]    count_0, count_1;
   wire [BODY:0] a_0, b_0, a_1, b_1;
@@ -67,7 +67,7 @@ module pgs_half_finder #(
   wire [5:0]    left_0, left_1, left_2, left_3, found_left;
   wire [3:0]    below;
   wire          has_room;
-  wire          unused = &{1'b0, left_0, left_1, left_2, left_3, found_left, below, beat_0[126-BODY+1:64],
+  wire          unused = &{1'b0, left_0, left_1, left_2, left_3, found_left, below, beat_0[111:64],
                            beat_0[47:0], beat_1[111:64], beat_1[47:0]};
   wire take, second;
   wire takes_pair = take & second;

@@ -28,7 +28,7 @@ module pgs_half_shapes #(
 `include "pgs_operators.vh"
 
   // An entry waits for its rounding.
-  localparam ROUNDING = FLOAT_TO_HALF_LATENCY;
+  localparam integer ROUNDING = {26'd0, FLOAT_TO_HALF_LATENCY};
   wire [15:0]      rounded;
   wire [1:0]       write_late;
   wire [SHAPE-1:0] address_late;

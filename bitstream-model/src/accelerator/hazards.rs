@@ -159,9 +159,10 @@ impl Pipeline {
     }
 
     /// Unchecked: slots pass in which nothing enters.
-    pub(super) fn pass_slots(&mut self, slots: u64) {
-        for _ in 0..slots * self.per_issue {
-            self.issue_padding();
+    pub(super) fn pass_slots(&mut self, slots: u64, velocities: &mut [Velocity]) {
+        for _ in 0..slots {
+            self.retire_due(velocities);
+            (0..self.per_issue).for_each(|_| self.issue_padding());
         }
     }
 

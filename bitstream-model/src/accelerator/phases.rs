@@ -268,7 +268,8 @@ impl Accelerator {
             let empty = at - profile.issues_take(issued, of_streams);
             cycles += empty;
             if self.config.hazards == Hazards::Unchecked {
-                self.pipeline.pass_slots(empty / u64::from(profile.initiation_interval));
+                let slots = empty / u64::from(profile.initiation_interval);
+                self.pipeline.pass_slots(slots, &mut self.velocities);
             }
             if warm {
                 self.read_warm_issue(&mut reader, &mut together);

@@ -42,6 +42,8 @@ pub type Beats = [Vec<StreamBeat>; STREAMS];
 enum Word {
     Number(u32),
     Integer(u32),
+    /// Of contact points; in sixteen bits it has no friction above it.
+    Count(u32),
 }
 
 type Row = [Word; LANES];
@@ -134,7 +136,7 @@ fn beats(format: StreamFormat, rows: &[Row]) -> Vec<Beat> {
     match format {
         StreamFormat::F32 => {
             let word = |word| match word {
-                Word::Number(word) | Word::Integer(word) => word,
+                Word::Number(word) | Word::Integer(word) | Word::Count(word) => word,
             };
             rows.iter().map(|row| Beat(row.map(word))).collect()
         }
@@ -157,6 +159,7 @@ fn beats(format: StreamFormat, rows: &[Row]) -> Vec<Beat> {
 fn sixteen(word: Word) -> u32 {
     match word {
         Word::Integer(word) => word.min(0xFFFF),
+        Word::Count(word) => (word & !collision::FRICTION_BITS).min(0xFFFF),
         Word::Number(bits) if f32::from_bits(bits).is_subnormal() => {
             bits >> 16 & 0x8000 | bits & 0x3FF | 1
         }
@@ -216,7 +219,7 @@ fn pose_rows(body: &Body) -> [Row; pose::ROWS] {
 fn collision_rows(collision: &Collision) -> Vec<Row> {
     let [a, b] = collision.bodies.map(Word::Integer);
     let mut rows = vec![
-        with(collision.normal, Word::Integer(collision.count)),
+        with(collision.normal, Word::Count(collision.count)),
         with(collision.positions[0], a),
         with(collision.positions[1], b),
     ];

@@ -106,6 +106,14 @@ pub enum BuildError {
         /// The requested depth.
         queue: u32,
     },
+    /// More bodies than an index of the profile's words can name.
+    #[error("{bodies} bodies, expected at most {most}")]
+    Bodies {
+        /// The requested number.
+        bodies: u32,
+        /// The largest number.
+        most: u32,
+    },
     /// Collisions leave a queue one by one.
     #[error("an issue queue of {queue} collisions in profile {profile}, expected none")]
     NoQueue {
@@ -145,6 +153,10 @@ impl Parameters {
         }
         if !profile.inertias().contains(&self.inertia) {
             return Err(BuildError::NoInertia { profile: profile.name });
+        }
+        let most = self.variant().body_capacity();
+        if self.bodies > most {
+            return Err(BuildError::Bodies { bodies: self.bodies, most });
         }
         if queue > 0 && !profile.has_queue() {
             return Err(BuildError::NoQueue { queue, profile: profile.name });
@@ -295,12 +307,13 @@ mod tests {
     /// The table entry of the profile holds the figures of these schedules.
     #[test]
     fn the_profile_has_the_depths_of_the_schedule() {
-        for inertia in FORMS {
-            let parameters = Parameters::with(inertia);
+        let builds = [(&FLOAT, FORMS[0]), (&FLOAT, FORMS[1]), (&HALF, FORMS[0])];
+        for (profile, inertia) in builds {
+            let parameters = Parameters::of(profile, inertia);
             let (design, variant) = (Design::new(parameters), parameters.variant());
             assert_eq!(design.depth(&design.contact), variant.contact(), "{inertia:?}");
             assert_eq!(design.depth(&design.friction), variant.friction(), "{inertia:?}");
-            assert_eq!(design.step_fill(), FLOAT.integration_fill);
+            assert_eq!(design.step_fill(), profile.integration_fill, "{}", profile.name);
         }
     }
 
