@@ -2,7 +2,7 @@
 //
 //   receivers -> loader ------------------------------------> velocities, 2 copies <-> solvers, one a collision of a pair
 //            \-> finder -> issue -> record registers -> solvers
-//            \-> integrator -> five integration pipelines -> results -> senders
+//            \-> integrator -> solvers: integration -> results -> senders
 //
 // A slot of three cycles carries a pair of collisions, one of them, or nothing, and nothing behind the issue ever
 // stops: no pipeline has a clock enable. The memories of bodies have two banks each, so that five bodies load in two
@@ -372,7 +372,40 @@ module pgs_half_core (
     end
   endgenerate
 
-  // ---- Impulses and pipelines, for each collision of a pair
+  // ---- Bodies into the integration: the five of a group in three cycles, two solvers side by side
+
+  wire [3:0]   quarters;
+  wire         group_valid;
+  wire [4:0]   group_live, body_free;
+  wire [559:0] body_poses;
+  wire [479:0] body_moving;
+  wire [79:0]  body_damping;
+  wire [2:0]   takes;
+  pgs_half_integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (
+    .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .damping(half_damping),
+    .groups(groups), .last_bodies(last_bodies),
+    .ready((count[0] >= 6'd2) & (count[1] >= 6'd2) & there[2] & (&room)), .heads(heads), .pop(pose_pops),
+    .enters(enters), .takes(takes), .finished(enter_finished), .address(entering), .mass_address(mass_address),
+    .velocities(read_velocities), .has_mass(has_mass),
+    .phases(quarters), .valid(group_valid), .live(group_live), .poses(body_poses), .moving(body_moving),
+    .free(body_free), .body_damping(body_damping)
+  );
+  localparam LANE = 225;               // pose, velocity, damping, and whether the body falls
+  wire [5*LANE-1:0] group_bodies;
+  generate
+    for (k = 0; k < 5; k = k + 1) begin : g_body
+      assign group_bodies[LANE*k +: LANE]
+        = {body_free[k], body_damping[16*k +: 16], body_moving[96*k +: 96], body_poses[112*k +: 112]};
+    end
+  endgenerate
+  reg [2*LANE-1:0] lanes;              // bodies 0 and 1, then 2 and 3, then 4; one cycle later
+  always @(posedge clk) begin
+    lanes <= quarters[0] ? group_bodies[2*LANE-1:0]
+           : quarters[1] ? group_bodies[4*LANE-1:2*LANE] : {{LANE{1'b0}}, group_bodies[5*LANE-1:4*LANE]};
+  end
+  wire [415:0] lane_results;
+
+  // ---- Impulses and a solver, for each collision of a pair
 
   wire [63:0] solved_impulses [0:1];
   wire [15:0] solved_total [0:1];
@@ -399,8 +432,9 @@ module pgs_half_core (
       wire         one_static = ~|mass[14:0] | ~|mass[46:32];
       wire [191:0] moving = velocities[192*k +: 192];
       wire         unused_words = &{1'b0, record[63:48], record[127:112], record[191:176]};
+      wire [LANE-1:0] body = lanes[LANE*k +: LANE];
       pgs_solver pipeline (
-        .clk(clk), .phase(phases), .friction(friction), .solves(~warm),
+        .clk(clk), .phase(phases), .friction(friction), .integrating(integrating), .solves(~warm),
         .normal(record[47:0]), .position_a(record[111:64]), .position_b(record[175:128]),
         .inverse_mass_a(mass[15:0]), .inverse_inertia_a(mass[31:16]),
         .inverse_mass_b(mass[47:32]), .inverse_inertia_b(mass[63:48]),
@@ -416,7 +450,13 @@ module pgs_half_core (
         .out_impulse2(solved_impulses[k][47:32]), .out_impulse3(solved_impulses[k][63:48]),
         .out_total(solved_total[k]),
         .out_linear_a(solved_a[k][47:0]), .out_angular_a(solved_a[k][95:48]),
-        .out_linear_b(solved_b[k][47:0]), .out_angular_b(solved_b[k][95:48])
+        .out_linear_b(solved_b[k][47:0]), .out_angular_b(solved_b[k][95:48]),
+        .position(body[47:0]), .orientation(body[111:48]), .linear(body[159:112]), .angular(body[207:160]),
+        .damping(body[223:208]), .integrates(integrate), .free(body[224]),
+        .time_step(half_time_step), .gravity_step(gravity_step),
+        .half_step(half_step), .series(series), .speed_limit(speed_limit),
+        .out_position(lane_results[208*k +: 48]), .out_orientation(lane_results[208*k+48 +: 64]),
+        .out_linear(lane_results[208*k+112 +: 48]), .out_angular(lane_results[208*k+160 +: 48])
       );
     end
   endgenerate
@@ -460,41 +500,20 @@ module pgs_half_core (
     .total(total_wide[30:0]), .sum(impulse_total)
   );
 
-  // ---- Integration and streams out
+  // ---- Streams out
 
-  wire [3:0]   quarters;
-  wire         group_valid;
-  wire [4:0]   group_live, body_free;
-  wire [559:0] body_poses;
-  wire [479:0] body_moving;
-  wire [79:0]  body_damping;
-  wire [2:0]   takes;
-  pgs_half_integrator #(.BODY(BODY), .READ_LATENCY(READ_LATENCY)) integrates (
-    .clk(clk), .start(clear), .run(integrating), .integrate(integrate), .damping(half_damping),
-    .groups(groups), .last_bodies(last_bodies),
-    .ready((count[0] >= 6'd2) & (count[1] >= 6'd2) & there[2] & (&room)), .heads(heads), .pop(pose_pops),
-    .enters(enters), .takes(takes), .finished(enter_finished), .address(entering), .mass_address(mass_address),
-    .velocities(read_velocities), .has_mass(has_mass),
-    .phases(quarters), .valid(group_valid), .live(group_live), .poses(body_poses), .moving(body_moving),
-    .free(body_free), .body_damping(body_damping)
-  );
-  wire [1039:0] new_bodies;
-  generate
-    for (k = 0; k < 5; k = k + 1) begin : g_integration
-      pgs_integration pipeline (
-        .clk(clk), .phase(quarters),
-        .position(body_poses[112*k +: 48]), .orientation(body_poses[112*k+48 +: 64]),
-        .linear(body_moving[96*k +: 48]), .angular(body_moving[96*k+48 +: 48]),
-        .damping(body_damping[16*k +: 16]), .integrates(integrate), .free(body_free[k]),
-        .time_step(half_time_step), .gravity_step(gravity_step),
-        .half_step(half_step), .series(series), .speed_limit(speed_limit),
-        .out_position(new_bodies[208*k +: 48]), .out_orientation(new_bodies[208*k+48 +: 64]),
-        .out_linear(new_bodies[208*k+112 +: 48]), .out_angular(new_bodies[208*k+160 +: 48])
-      );
-    end
-  endgenerate
+  // Results of bodies 0 and 1 leave the solvers a cycle and the depth after cycle 0 of their group. All five are in
+  // registers four cycles and the depth after it, which is cycle 0 of `result_quarters`.
+  localparam AT  = INTEGRATION_DEPTH % 4;
+  localparam WAY = (INTEGRATION_DEPTH + 7) / 4;
+  wire [3:0]    result_quarters = (quarters >> AT) | (quarters << (4 - AT));
+  reg  [1039:0] new_bodies;
+  always @(posedge clk) begin
+    if (result_quarters[1]) new_bodies[415:0]    <= lane_results;
+    if (result_quarters[2]) new_bodies[831:416]  <= lane_results;
+    if (result_quarters[3]) new_bodies[1039:832] <= lane_results[207:0];
+  end
 
-  localparam WAY = INTEGRATION_DEPTH / 4;
   reg  [WAY-1:0] valid_groups;
   wire [4:0]     result_live;
   always @(posedge clk) begin
@@ -507,7 +526,7 @@ module pgs_half_core (
   wire [2:0]   result_push;
   wire [383:0] result_rows;
   pgs_half_results leaves (
-    .clk(clk), .clear(clear), .phases(quarters), .valid(valid_groups[WAY-1]), .live(result_live),
+    .clk(clk), .clear(clear), .phases(result_quarters), .valid(valid_groups[WAY-1]), .live(result_live),
     .bodies(new_bodies), .push(result_push), .rows(result_rows)
   );
 

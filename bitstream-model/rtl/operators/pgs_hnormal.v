@@ -1,16 +1,14 @@
 // The significand of a binary16 number with a leading one, a subnormal one shifted to it.
-// Combinational: the first step of hmul, hdiv and hsqrt.
+// Combinational: the second stage of hmul, hdiv and hsqrt.
 //
-// The exponent of the number is {a[14:10], but 1 for 0} less `leading`. A zero has significand 0.
+// The exponent of the number, 1 of a subnormal one, goes down by `leading`. A zero keeps significand 0.
 `default_nettype none
 
 module pgs_hnormal (
-  input  wire [14:0] a,
+  input  wire [10:0] plain,        // the fraction, behind a 1 if the number is normal
   output wire [10:0] significand,
   output wire  [3:0] leading       // zeros in front of the leading one
 );
-
-  wire [10:0] plain = {|a[14:10], a[9:0]};
 
   // Each step looks into the half that holds the leading one.
   wire [15:0] in_16  = {plain, 5'b10000};

@@ -1,11 +1,12 @@
 // Square root of a binary16 number, rounded to nearest even: y = sqrt(a).
 //
-// Latency 8, one root a cycle. Non-restoring square root, 12 rows of one bit of the root, two rows
+// Latency 9, one root a cycle. Non-restoring square root, 12 rows of one bit of the root, two rows
 // a stage:
 //
-//    1        unpack  significand, a subnormal one shifted to its leading one; zero, NaN, infinity
-//    2 ..  7  rows    row r gives bit 11 - r of the root
-//    8        round   rounding; zeros, infinities and NaN
+//    1        unpack     significand, exponent; zero, NaN and infinity
+//    2        normalise  a subnormal significand shifted to its leading one
+//    3 ..  8  rows       row r gives bit 11 - r of the root
+//    9        round      rounding; zeros, infinities and NaN
 //
 // The root of a number of 11 bits is never half way between two numbers of 11 bits: the bit below
 // the fraction decides the rounding, and the remainder is not needed. No root is subnormal. The
@@ -23,47 +24,56 @@ module pgs_hsqrt (
 
   localparam STAGES = 6;
 
-  // Stage 1: unpack. With biased exponent e the root's is (e + 15) / 2, rounded down. It is noted
-  // less 1, which the leading bit of the root adds again.
+  // Stage 1: unpack.
   wire zero     = ~|a[14:0];
   wire infinite = (a == {1'b0, 5'h1f, 10'd0});
   wire nan      = ((&a[14:10]) & (|a[9:0])) | (a[15] & ~zero);
 
+  reg [10:0] plain_s1;
+  reg  [5:0] exponent_s1;
+
+  always @(posedge clk) begin
+    plain_s1    <= {|a[14:10], a[9:0]};
+    exponent_s1 <= {1'b0, a[14:11], a[10] | (~|a[14:10])} + 6'd13;
+  end
+
+  // Stage 2: normalise. With biased exponent e the root's is (e + 15) / 2, rounded down. It is noted
+  // less 1, which the leading bit of the root adds again.
   wire [10:0] significand;
   wire  [3:0] leading;
 
   pgs_hnormal normal (
-    .a(a[14:0]),
+    .plain(plain_s1),
     .significand(significand),
     .leading(leading)
   );
 
-  reg [10:0] significand_s1;
-  reg  [5:0] twice_exponent_s1;
+  reg [10:0] significand_s2;
+  reg  [5:0] twice_exponent_s2;
 
   always @(posedge clk) begin
-    significand_s1    <= significand;
-    twice_exponent_s1 <= {1'b0, a[14:11], a[10] | (~|a[14:10])} + 6'd13 - {2'd0, leading};
+    significand_s2    <= significand;
+    twice_exponent_s2 <= exponent_s1 - {2'd0, leading};
   end
 
   // The significand of an odd exponent is as it is, of an even one doubled: 1 .. 4, with two bits
-  // before the point. The rows of stages 2 to 4 take a pair of its bits each, later ones zeros.
+  // before the point. The rows of stages 3 to 5 take a pair of its bits each, later ones zeros.
   localparam RADICAND_STAGES = 3;
   localparam NOTES           = 4;
 
-  wire [11:0] scaled = twice_exponent_s1[0] ? {significand_s1, 1'b0} : {1'b0, significand_s1};
+  wire [11:0] scaled = twice_exponent_s2[0] ? {significand_s2, 1'b0} : {1'b0, significand_s2};
 
   reg [12*(RADICAND_STAGES-1)-1:0] radicand;
   reg [5*STAGES-1:0]               exponent;
-  reg [NOTES*(STAGES+1)-1:0]       notes;
+  reg [NOTES*(STAGES+2)-1:0]       notes;
 
   always @(posedge clk) begin
     radicand <= {radicand[12*(RADICAND_STAGES-2)-1:0], scaled};
-    exponent <= {exponent[5*(STAGES-1)-1:0], twice_exponent_s1[5:1]};
-    notes    <= {notes[NOTES*STAGES-1:0], a[15], zero, infinite, nan};
+    exponent <= {exponent[5*(STAGES-1)-1:0], twice_exponent_s2[5:1]};
+    notes    <= {notes[NOTES*(STAGES+1)-1:0], a[15], zero, infinite, nan};
   end
 
-  // Stages 2 to 7: the rows. Row r has r bits of root and a remainder of r + 2 bits, in two's
+  // Stages 3 to 8: the rows. Row r has r bits of root and a remainder of r + 2 bits, in two's
   // complement between -2 root - 1 and 2 root. It quadruples the remainder, appends two bits of the
   // radicand, and subtracts 4 root + 1 from a remainder that is not negative, or adds 4 root + 3 to
   // one that is: that subtracts the root, or its complement, followed by 01.
@@ -72,7 +82,7 @@ module pgs_hsqrt (
   // a zero in front: 2 g + 1 bits of root and 2 g + 2 bits of remainder.
   reg [STAGES*STAGES-1:0]     roots;
   reg [STAGES*(STAGES+1)-1:0] remainders;
-  reg [2*STAGES-1:0]          root_s7;
+  reg [2*STAGES-1:0]          root_s8;
 
   always @(posedge clk) begin
     roots[0]        <= 1'b0;
@@ -110,25 +120,25 @@ module pgs_hsqrt (
           remainders[REMAINDER+R+2 +: R+4] <= left_1;
         end
       end else begin : last
-        always @(posedge clk) root_s7 <= root_2[R+1:0];
+        always @(posedge clk) root_s8 <= root_2[R+1:0];
 
         wire unused = &{1'b0, root_2[R+2], left_1[R+2:0], radicand[12*RADICAND_STAGES-13 -: 8]};
       end
     end
   endgenerate
 
-  // Stage 8: round. A carry out of the fraction raises the exponent.
-  wire  [4:0] exponent_s7 = exponent[5*(STAGES-1) +: 5];
-  wire [14:0] truncated   = {exponent_s7, 10'd0} + {4'd0, root_s7[11:1]};
-  wire [14:0] rounded     = truncated + {14'd0, root_s7[0]};
+  // Stage 9: round. A carry out of the fraction raises the exponent.
+  wire  [4:0] exponent_s8 = exponent[5*(STAGES-1) +: 5];
+  wire [14:0] truncated   = {exponent_s8, 10'd0} + {4'd0, root_s8[11:1]};
+  wire [14:0] rounded     = truncated + {14'd0, root_s8[0]};
 
   always @(posedge clk) begin
-    if (notes[NOTES*STAGES])
+    if (notes[NOTES*(STAGES+1)])
       y <= 16'h7e00;
-    else if (notes[NOTES*STAGES+1])
+    else if (notes[NOTES*(STAGES+1)+1])
       y <= {1'b0, 5'h1f, 10'd0};
-    else if (notes[NOTES*STAGES+2])
-      y <= {notes[NOTES*STAGES+3], 15'd0};
+    else if (notes[NOTES*(STAGES+1)+2])
+      y <= {notes[NOTES*(STAGES+1)+3], 15'd0};
     else
       y <= {1'b0, rounded};
   end

@@ -192,15 +192,6 @@ impl Pipeline {
     }
 }
 
-/// A module of the hardware: pipelines that never run together, on one pool of units.
-#[derive(Debug)]
-pub struct Module<'a> {
-    /// Its name in the Verilog, without the prefix `pgs_` of all modules.
-    pub name: &'static str,
-    /// The pipelines: one, two or three.
-    pub pipelines: Vec<&'a Pipeline>,
-}
-
 /// A build of a profile.
 #[derive(Debug)]
 pub struct Design {
@@ -211,8 +202,8 @@ pub struct Design {
     pub contact: Pipeline,
     /// Friction passes, likewise.
     pub friction: Pipeline,
-    /// Integration, as fast as the streams take results: in `float` a body a cycle, in `half` five
-    /// bodies in four cycles, by five pipelines.
+    /// Integration, a body a cycle: in `float` as fast as the streams take results, in `half`, where
+    /// they take five bodies in four cycles, one of two.
     pub integration: Pipeline,
 }
 
@@ -224,14 +215,12 @@ struct Around {
     /// The cycles of a step in which nothing is loaded, passed or integrated, beside the way of the
     /// last body through the integration.
     step: u32,
-    /// From a body to the next in one pipeline of the integration.
-    interval: u32,
 }
 
 /// Around a step: set-up in front of the first pass (10), the end of the load (2), the entry into
 /// the integration (1), the result FIFOs and their end (5), the sums and the end (3).
-const AROUND_FLOAT: Around = Around { pass: 8, step: 21, interval: 1 };
-const AROUND_HALF: Around = Around { pass: 9, step: 25, interval: 4 };
+const AROUND_FLOAT: Around = Around { pass: 8, step: 21 };
+const AROUND_HALF: Around = Around { pass: 9, step: 29 };
 
 impl Parameters {
     fn around(&self) -> &'static Around {
@@ -251,11 +240,7 @@ impl Design {
             parameters,
             contact: Pipeline::new("contact", contact, interval),
             friction: Pipeline::new("friction", friction, interval),
-            integration: Pipeline::new(
-                "integration",
-                equations::integration(precision),
-                parameters.around().interval,
-            ),
+            integration: Pipeline::new("integration", equations::integration(precision), 1),
         }
     }
 
@@ -263,20 +248,6 @@ impl Design {
     #[must_use]
     pub fn pipelines(&self) -> [&Pipeline; 3] {
         [&self.contact, &self.friction, &self.integration]
-    }
-
-    /// The modules that the pipelines are: one, unless the passes and the integration differ in
-    /// the number of their pipelines.
-    #[must_use]
-    pub fn modules(&self) -> Vec<Module<'_>> {
-        let [passes @ .., integration] = self.pipelines();
-        if integration.schedule.interval == 1 {
-            return vec![Module { name: "solver", pipelines: self.pipelines().to_vec() }];
-        }
-        vec![
-            Module { name: "solver", pipelines: passes.to_vec() },
-            Module { name: "integration", pipelines: vec![integration] },
-        ]
     }
 
     /// Fill and hazard window of a pipeline, if it is one of the passes.
@@ -336,12 +307,13 @@ mod tests {
     /// The table entry of the profile holds the figures of these schedules.
     #[test]
     fn the_profile_has_the_depths_of_the_schedule() {
-        for inertia in FORMS {
-            let parameters = Parameters::with(inertia);
+        let builds = [(&FLOAT, FORMS[0]), (&FLOAT, FORMS[1]), (&HALF, FORMS[0])];
+        for (profile, inertia) in builds {
+            let parameters = Parameters::of(profile, inertia);
             let (design, variant) = (Design::new(parameters), parameters.variant());
             assert_eq!(design.depth(&design.contact), variant.contact(), "{inertia:?}");
             assert_eq!(design.depth(&design.friction), variant.friction(), "{inertia:?}");
-            assert_eq!(design.step_fill(), FLOAT.integration_fill);
+            assert_eq!(design.step_fill(), profile.integration_fill, "{}", profile.name);
         }
     }
 

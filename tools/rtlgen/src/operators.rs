@@ -56,9 +56,9 @@ impl Operation {
         let of = |single, in_half| if half { in_half } else { single };
         let ((module, latency), ports, arithmetic): (_, &[&str], _) = match self {
             Self::Add => (of(("fadd", 7), ("hadd", 5)), AB, true),
-            Self::Multiply => (of(("fmul", 5), ("hmul", 4)), AB, true),
-            Self::Divide => (of(("fdiv", 29), ("hdiv", 10)), AB, true),
-            Self::SquareRoot => (of(("fsqrt", 27), ("hsqrt", 8)), &["a"], true),
+            Self::Multiply => (of(("fmul", 5), ("hmul", 5)), AB, true),
+            Self::Divide => (of(("fdiv", 29), ("hdiv", 11)), AB, true),
+            Self::SquareRoot => (of(("fsqrt", 27), ("hsqrt", 9)), &["a"], true),
             Self::SineCosine => (of(("fsincos", 26), ("hsincos", 12)), &["a"], true),
             Self::Maximum => (("fmax", 1), AB, false),
             Self::Minimum => (("fmin", 1), AB, false),

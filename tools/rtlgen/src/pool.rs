@@ -45,11 +45,12 @@ impl Unit {
     }
 }
 
-/// The largest number of operands from which a port of a unit takes one: as many as two passes have
-/// phases. In `float` four, a LUT a bit and one level of logic; in `half` six, two LUTs a bit.
+/// The largest number of operands from which a port of a unit takes one. Two passes of two phases have
+/// four, a LUT a bit and one level of logic; two of three phases, and the integration, seven, three
+/// LUTs a bit and two levels.
 fn choices(pipelines: &[&Pipeline]) -> usize {
     let phases = pipelines.iter().map(|pipeline| pipeline.schedule.interval).max();
-    2 * usize::try_from(phases.unwrap_or(1)).unwrap_or(1)
+    if phases == Some(3) { 7 } else { 4 }
 }
 
 /// The units of some pipelines: a comparison or a selection is as small as the choice between its

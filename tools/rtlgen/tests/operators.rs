@@ -143,8 +143,8 @@ const HALF_FAULTS: [Fault; 7] = [
     Fault {
         operator: "sqrt",
         file: "pgs_hsqrt.v",
-        correct: "+ 6'd13 - {2'd0, leading}",
-        wrong: "+ 6'd13",
+        correct: "exponent_s1 - {2'd0, leading}",
+        wrong: "exponent_s1",
     },
     // One argument alone is wrong: its cosine is rounded twice.
     Fault {

@@ -19,12 +19,12 @@ const FLOAT_WORLD_CONTACT: Depth = Depth { fill: 388, window: 324 };
 const FLOAT_WORLD_FRICTION: Depth = Depth { fill: 328, window: 190 };
 
 /// Pipelines of `half`: schedules of the generated Verilog, in whole slots of three cycles.
-const HALF_CONTACT: Depth = Depth { fill: 273, window: 243 };
-const HALF_FRICTION: Depth = Depth { fill: 210, window: 147 };
+const HALF_CONTACT: Depth = Depth { fill: 285, window: 255 };
+const HALF_FRICTION: Depth = Depth { fill: 222, window: 156 };
 
-/// Fill of the integration in the generated Verilog of `half`: 140 cycles of the pipeline, 8 of the
-/// reads before it, and 23 of set-up and control.
-const HALF_INTEGRATION_FILL: u32 = 171;
+/// Fill of the integration in the generated Verilog of `half`: 142 cycles of the pipeline, 8 of the
+/// reads before it, and 27 of set-up and control.
+const HALF_INTEGRATION_FILL: u32 = 177;
 
 /// Pipelines of `naive`: assumptions.
 const CONTACT: Depth = Depth { fill: 364, window: 316 };

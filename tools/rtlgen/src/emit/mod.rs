@@ -36,10 +36,8 @@ pub fn files(design: &Design) -> Vec<File> {
     for source in sources::of(design.parameters.profile) {
         modules.push(file(source.file, source.text.into()));
     }
-    for module in design.modules() {
-        let text = solver::module(&module, design.parameters.smallest_normal);
-        modules.push(file(&format!("pgs_{}.v", module.name), text));
-    }
+    let solver = solver::module(&design.pipelines(), design.parameters.smallest_normal);
+    modules.push(file("pgs_solver.v", solver));
     let list: String = modules.iter().map(|module| format!("{}\n", module.name)).collect();
     files.append(&mut modules);
     files.push(file("pgs.f", list));

@@ -10,15 +10,18 @@
 //! Numbers that depend on the arguments alone are computed once a step, by the unit `constants`:
 //! `half_step` = 0.5*dt, `series` = ((dt*dt)*dt) * 0.020833334, `speed_limit` = limit / dt and the
 //! three components of g*dt. A body of inverse mass 0 has a damping of 1 and keeps its velocity; at
-//! rest it keeps its pose, too. In binary32 the arguments of the sine and of the cosine are the same
-//! number, for a factor of 0.5 is exact, and `half_angle_limit` = (`speed_limit`*dt) * 0.5 comes with
-//! the other numbers, so that the half angle is there in time, whether the body is too fast or not.
-//! In binary16 the factor rounds a subnormal number.
+//! rest it keeps its pose, too. The arguments of the sine and of the cosine are the same number, for
+//! a factor of 0.5 is exact. In binary32 `half_angle_limit` = (`speed_limit`*dt) * 0.5 comes with the
+//! other numbers, so that the half angle is there in time, whether the body is too fast or not. In
+//! binary16 the factor rounds a subnormal number, which is then its own sine.
 
 use pgs_interface::number::Precision;
 use pgs_interface::profile::solver::{ROTATION_LIMIT, SERIES_BELOW};
 
 use crate::graph::{Graph, Operand, Source, Vec3};
+
+/// Below this angle the sine in binary16 is its argument.
+const SINE_IS_ARGUMENT_BELOW: f32 = 1.0 / 32.0;
 
 /// The graph of the integration. `integrates` is 0 in a step without integration, where bodies keep
 /// their state; `free` is 1 for a body with a mass in a step with integration.
@@ -90,20 +93,24 @@ fn rotation(g: &mut Graph, angular: Vec3, time_step: Operand) -> [Operand; 4] {
     let term = g.multiply(term, speed);
     let by_series = g.subtract(half_step, term);
 
-    let (of_sine, of_cosine) = match half_angle_limit {
+    let (sine, cosine) = match half_angle_limit {
         Some(limit) => {
             let half_angle = g.multiply(angle, half);
             let half_angle = g.select(too_fast, limit, half_angle);
-            (half_angle, half_angle)
+            let [sine, cosine] = g.sine_cosine(half_angle);
+            (sine, cosine)
         }
         None => {
-            let half_speed = g.multiply(speed, half);
             let angle = g.multiply(speed, time_step);
-            (g.multiply(half_speed, time_step), g.multiply(angle, half))
+            let half_angle = g.multiply(angle, half);
+            let [sine, cosine] = g.sine_cosine(half_angle);
+            let half_speed = g.multiply(speed, half);
+            let own_angle = g.multiply(half_speed, time_step);
+            let is_own_sine = g.constant(SINE_IS_ARGUMENT_BELOW);
+            let small = g.less(half_angle, is_own_sine);
+            (g.select(small, own_angle, sine), cosine)
         }
     };
-    let [sine, _] = g.sine_cosine(of_sine);
-    let [_, cosine] = g.sine_cosine(of_cosine);
     let by_sine = g.divide(sine, speed);
     let scale = g.select(slow, by_series, by_sine);
     let Vec3([x, y, z]) = g.scale(angular, scale);

@@ -24,19 +24,19 @@ pub static OPERATORS: [Operator; 13] = [
     },
     Operator {
         name: "mul",
-        latency: 4,
+        latency: 5,
         expected: |v| bits_of((first(v) * second(v)).value).into(),
         found: |outputs| outputs[1].into(),
     },
     Operator {
         name: "div",
-        latency: 10,
+        latency: 11,
         expected: |v| bits_of((first(v) / second(v)).value).into(),
         found: |outputs| outputs[2].into(),
     },
     Operator {
         name: "sqrt",
-        latency: 8,
+        latency: 9,
         expected: |v| sqrt(low(v.radicand)).into(),
         found: |outputs| outputs[3].into(),
     },
