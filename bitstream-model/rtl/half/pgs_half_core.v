@@ -106,7 +106,7 @@ module pgs_half_core (
 
   pgs_step_sequence #(
     .INTERVAL(3), .SETUP(SETUP), .CONTACT_FILL(CONTACT_FILL), .FRICTION_FILL(FRICTION_FILL),
-    .FINISH(INTEGRATION_DEPTH + 13)
+    .FINISH(INTEGRATION_DEPTH + 17)
   ) steps (
     .clk(clk), .reset(reset), .start(start), .error(error),
     .collisions(pairs), .contact_passes(contact_passes), .friction_passes(friction_passes),

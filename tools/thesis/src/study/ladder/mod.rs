@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(cycles[3], wide);
         assert_eq!(
             &cycles[5..],
-            [2_066_606, 8 * 254_000 + 2_680 + 264 + 11_664 + 13_608, 1_552_216]
+            [2_066_606, 8 * 254_000 + 2_028 + 177 + 11_664 + 13_608, 1_551_477]
         );
         let recorded: Vec<Option<u64>> =
             outcome.rungs.iter().map(|rung| rung.recorded_cycles).collect();
