@@ -49,20 +49,25 @@ fn a_program_that_ends_or_answers_nonsense_is_no_accelerator() {
     assert!(stderr.contains("IDENTIFICATION is 0x64636261, expected 0x50475331"), "{stderr}");
 }
 
+/// A program that answers the reads of IDENTIFICATION, PROFILE and FEATURES as a `float`.
 #[test]
-fn another_profile_than_the_generated_one_is_refused() {
-    let (code, stderr) = solve("rtl:/no/such/simulator", &["--profile", "half"]);
+fn a_simulator_of_another_profile_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let words = "1SGP\\001\\000\\000\\000\\000\\000\\000\\000";
+    let float = program(folder.path(), &format!("#!/bin/sh\nprintf '{words}'\ncat >/dev/null\n"));
+    let (code, stderr) = solve(&float, &["--profile", "half"]);
     assert_eq!(code, Some(2), "{stderr}");
-    assert!(stderr.contains("of profile float, not half"), "{stderr}");
+    assert!(stderr.contains("float") && stderr.contains("half"), "{stderr}");
 }
 
-/// A program that answers the reads of IDENTIFICATION and FEATURES as an interlocked accelerator
-/// with isotropic inertia.
+/// A program that answers the reads of IDENTIFICATION, PROFILE and FEATURES as an interlocked
+/// `float` with isotropic inertia.
 #[test]
 fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
     let folder = tempfile::tempdir().expect("a folder");
+    let words = "1SGP\\001\\000\\000\\000\\001\\000\\000\\000";
     let isotropic =
-        program(folder.path(), "#!/bin/sh\nprintf '1SGP\\001\\000\\000\\000'\ncat >/dev/null\n");
+        program(folder.path(), &format!("#!/bin/sh\nprintf '{words}'\ncat >/dev/null\n"));
     let (code, stderr) = solve(&isotropic, &["--inertia", "world"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("built for isotropic inertia, and the board for world"), "{stderr}");
@@ -82,26 +87,22 @@ fn serve(folder: &Path, accelerator: &str, more: &[&str]) -> Command {
 #[test]
 fn a_board_is_not_served_without_its_simulator() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (more, reason) in [
-        (&[][..], "the simulator /no/such cannot be started"),
-        (&["--profile", "half"], "of profile float, not half"),
-    ] {
-        let ran = Ran::from(serve(folder.path(), "rtl:/no/such", more).output().expect("it runs"));
-        assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
-        assert!(ran.stderr.contains(reason), "{}", ran.stderr);
-        let left = fs::read_dir(folder.path()).expect("a folder").count();
-        assert_eq!(left, 0, "neither a socket nor memory is left");
-    }
+    let ran = Ran::from(serve(folder.path(), "rtl:/no/such", &[]).output().expect("it runs"));
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the simulator /no/such cannot be started"), "{}", ran.stderr);
+    let left = fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 0, "neither a socket nor memory is left");
 }
 
 #[test]
 fn a_served_board_whose_simulator_ends_says_so_and_is_served_no_more() {
     let folder = tempfile::tempdir().expect("a folder");
-    // It answers the first four requests: the identification, the features of an interlocked
-    // accelerator, and no fence.
-    let words = "1SGP\\001\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000";
-    let four_requests = format!("printf '{words}'\nhead -c 48 >/dev/null\n");
-    let ends = program(folder.path(), &format!("#!/bin/sh\n{four_requests}"));
+    // It answers the first five requests: the identification, the profile, the features of an
+    // interlocked accelerator, and no fence.
+    let one = "\\001\\000\\000\\000";
+    let none = "\\000\\000\\000\\000";
+    let five_requests = format!("printf '1SGP{one}{one}{none}{none}'\nhead -c 60 >/dev/null\n");
+    let ends = program(folder.path(), &format!("#!/bin/sh\n{five_requests}"));
     let mut command = serve(folder.path(), &ends, &[]);
     let server = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut server = Tied(server);

@@ -43,6 +43,7 @@ pub const MIXED: Profile = Profile {
         Stripe { streams: &[0, 1, 2], padded: false },
     )
     .with_warm_collisions(Stripe { streams: &[0, 1, 2, 2], padded: false }),
+    slotted: false,
     initiation_interval: 1,
     contact: CONTACT,
     friction: FRICTION,
