@@ -169,7 +169,7 @@ parts='' parameters=
 check pgs_control_block pdr \
 	'if (bready) bvalid' 'bvalid' \
 	'& ~sticky & ~failed) go' '& ~sticky) go'
-parts='pgs_fifo pgs_word_sum' parameters='CHANNEL=3'
+parts='pgs_fifo pgs_word_sum' parameters=
 check pgs_receiver 'pdr -F 22' \
 	'tlast != beat_is_last' 'tlast & ~beat_is_last' \
 	"left == 21'd2" "left == 21'd3" \

@@ -5,16 +5,15 @@
 // choice.
 `default_nettype none
 
-module pgs_receiver_properties #(
-  parameter integer CHANNEL       = 0,
-  parameter integer WORLD_INERTIA = 0
-) (
+module pgs_receiver_properties (
   input wire         clk,
   input wire         stop,
   input wire         start,
   input wire         clear,
-  input wire [19:0]  bodies,
-  input wire [19:0]  collisions,
+  input wire [20:0]  velocity_beats,
+  input wire [20:0]  pass_beats,
+  input wire [20:0]  warm_beats,
+  input wire [20:0]  pose_beats,
   input wire [9:0]   passes,
   input wire [8:0]   friction_passes,
   input wire         warm_start,
@@ -25,7 +24,7 @@ module pgs_receiver_properties #(
   input wire [5:0]   count,
   input wire         there,
   input wire         pop,
-  input wire         collision_begins,
+  input wire         comes,
   input wire         error,
   input wire [7:0]   error_code,
   input wire [20:0]  error_beat
@@ -49,7 +48,8 @@ module pgs_receiver_properties #(
   end
   always @* if (age != 3'd0) begin
     assume ((b != 0) & ((c != 0) | ({contacts, frictions} == 0)));
-    assume ((bodies == {17'd0, b}) & (collisions == {18'd0, c}) & (warm_start == warm));
+    assume ((velocity_beats == {17'd0, dealt}) & (pose_beats == {17'd0, dealt}) & (warm_start == warm));
+    assume ((pass_beats == {19'd0, c}) & (warm_beats == {18'd0, c, 1'b0}));
     assume (passes == {8'd0, contacts} + {8'd0, frictions});
     assume (friction_passes == {7'd0, frictions});
   end
@@ -73,13 +73,11 @@ module pgs_receiver_properties #(
 
   reg  [3:0] packet;
   reg  [3:0] taken;                      // beats of it
-  // Two beats a body, dealt to the streams in turn; with world inertia four, one for each.
-  wire [3:0] dealt = ({b, 1'b0} + 4'd3 - CHANNEL) / 4;
+  // As on stream 3 of `float`: the last of four to which two beats a body are dealt in turn, and one beat a
+  // collision, two in a warm pass.
+  wire [3:0] dealt = {1'b0, b} / 2;
   function [3:0] beats(input [3:0] of);
-    if (of == 0) beats = (WORLD_INERTIA != 0) ? {1'b0, b} : dealt;
-    else if (of > {2'd0, contacts} + {2'd0, frictions}) beats = dealt;
-    // Streams 0 to 2 have two of the seven beats of a collision, stream 3 one, and that of the impulses.
-    else if (CHANNEL != 3) beats = {1'b0, c, 1'b0};
+    if ((of == 0) | (of > {2'd0, contacts} + {2'd0, frictions})) beats = dealt;
     else if (warm & ((of == 1) | (of == {2'd0, contacts} + 4'd1))) beats = {1'b0, c, 1'b0};
     else beats = {2'd0, c};
   endfunction
@@ -94,7 +92,7 @@ module pgs_receiver_properties #(
   always @(posedge clk) begin
     if (~running) begin
       {taken, wrong} <= 5'd0;
-      packet <= ((WORLD_INERTIA == 0) & none) ? 4'd1 : 4'd0;
+      packet <= none ? 4'd1 : 4'd0;
     end else if (takes) begin
       wrong <= wrong | is_wrong;
       taken <= its_last ? 4'd0 : taken + 4'd1;
@@ -128,14 +126,13 @@ module pgs_receiver_properties #(
       assert (error_beat == {17'd0, its_number});
       assert (error_code == (was_early ? ERROR_TLAST_EARLY : was_missing ? ERROR_TLAST_MISSING : ERROR_PARTIAL_BEAT));
     end
-    // The finder hears of the first beat of each collision on streams 0, 1 and 2.
-    if (~wrong & (CHANNEL != 3)) assert (collision_begins == (takes & in_pass & ~taken[0]));
+    // Each beat of a pass is told as it comes.
+    if (~wrong) assert (comes == (takes & in_pass));
     // The FIFO does not run over.
     assert ((count == inside) & (inside <= 6'd32) & (there == (inside != 0)));
   end
 endmodule
 
-bind pgs_receiver pgs_receiver_properties
-  #(.CHANNEL(CHANNEL), .WORLD_INERTIA(WORLD_INERTIA)) properties (.*);
+bind pgs_receiver pgs_receiver_properties properties (.*);
 
 `default_nettype wire

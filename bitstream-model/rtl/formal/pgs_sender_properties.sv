@@ -11,7 +11,7 @@ module pgs_sender_properties #(
   input wire         clk,
   input wire         clear,
   input wire         stop,
-  input wire [19:0]  bodies,
+  input wire [19:0]  rows_of_results,
   input wire         enters,
   input wire         has_room,
   input wire         push,
@@ -31,14 +31,14 @@ module pgs_sender_properties #(
 
   // ---- The user
 
-  // The number of bodies is settled for longer than a cycle as a step begins.
+  // The number of rows is settled for longer than a cycle as a step begins.
   reg begun = 1'b0, settled = 1'b0;
   always @(posedge clk) begin
     {begun, settled} <= {1'b1, begun};
     assume (settled | clear);
-    if (begun) assume (~clear | (bodies == $past(bodies)));
-    if (settled) assume (clear | (bodies == $past(bodies)));
-    assume (bodies != 0);
+    if (begun) assume (~clear | (rows_of_results == $past(rows_of_results)));
+    if (settled) assume (clear | (rows_of_results == $past(rows_of_results)));
+    assume (rows_of_results != 0);
   end
 
   // A collision issues in every second cycle at most, in the cycle behind one in which there is room. Each
@@ -90,7 +90,7 @@ module pgs_sender_properties #(
     if (clear) begin
       inside       <= 0;
       followed     <= 1'b0;
-      results_left <= bodies;
+      results_left <= rows_of_results;
     end else begin
       inside <= inside + push - leaves;
       if (push & result) results_left <= results_left - 20'd1;
