@@ -74,7 +74,7 @@ module pgs_core (
   localparam COLLISION      = COLLISION_BITS;  // bits of a collision's number
   localparam SHAPE          = 6;               // bits of a shape's number
 
-  // Passes of the step: a kind that has any has a warm one more. Without collisions there are none.
+  // Passes of the step. A kind with passes has a warm pass in front of them. A step without collisions has no pass.
   reg [8:0] contact_passes, friction_passes;
   reg [9:0] passes;
   reg       no_contacts;

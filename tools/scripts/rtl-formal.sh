@@ -47,7 +47,7 @@ bound() {
 }
 
 # Makes a circuit of the module `$1` of the file `$2` and its properties: folder/circuit.aig. `$parameters` are of this
-# module, `$parts` the files of those inside, `$headers` a folder that is searched first.
+# module, `$parts` the files of the modules inside, `$headers` a folder that is searched first.
 circuit() {
 	local module=$1 folder=$work/$1 part files=
 	rm -rf "$folder"
@@ -85,7 +85,7 @@ solve() {
 }
 
 failed=
-# Prints what was found about the module `$1`.
+# Prints the result for the module `$1`.
 report() {
 	local module=$1 folder=$work/$1 result
 	if [ -s "$folder/found" ]; then

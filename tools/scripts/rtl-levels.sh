@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Counts the levels of logic between the registers of the operators and of the issue queue, by Yosys' synthesis
-# for UltraScale+, and the registers that each clock enable of the whole accelerator drives. Nothing is placed. It
-# fails where a clock enable drives more than 1,200.
+# Counts the levels of logic between the registers of the operators, of the issue queue, and of the accelerator without
+# its solver, by Yosys' synthesis for UltraScale+, and the registers that each clock enable of the whole drives.
+# Nothing is placed. It fails where a clock enable drives more than 1,200.
 #
 # usage: rtl-levels.sh [OPTION...]     options of `rtlgen generate`, such as --inertia world
 # environment: YOSYS (the program; yosys)
@@ -23,10 +23,11 @@ attend cargo run --quiet --locked -p rtlgen -- generate --out "$work" "$@" >/dev
 
 cd "$work"
 sources=$(tr '\n' ' ' < pgs.f)
-modules=(pgs_fadd pgs_fmul pgs_fdiv pgs_fsqrt pgs_horner pgs_fsincos pgs_queue)
+modules=(pgs_fadd pgs_fmul pgs_fdiv pgs_fsqrt pgs_horner pgs_fsincos pgs_queue pgs_top)
 for module in "${modules[@]}"; do
 	attend timeout 3600 "$yosys" -q -p "
 		read_verilog $sources
+		blackbox pgs_solver
 		synth_xilinx -family xcup -flatten -noiopad -noclkbuf -top $module
 		write_blif $module.blif" > "$module.log" 2>&1 || { tail -n 5 "$module.log" >&2; fail "Yosys on $module"; }
 done

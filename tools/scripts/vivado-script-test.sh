@@ -185,7 +185,7 @@ script=build.tcl
 		"which is not in the project"
 	plant "a design that is not validated" $script '/^\tvalidate_bd_design/d' "before it is valid"
 }
-# The blocks that the script counts are those of the Verilog, but for the FIFOs of the results.
+# The script counts the blocks of the Verilog, but for the FIFOs of the results.
 for build in rtl world half kv260 zcu104; do
 	command -v yosys >/dev/null || break
 	yosys -q -p "read_verilog -I$folder/$build $(sed "s|^|$folder/$build/|" "$folder/$build/pgs.f" | tr '\n' ' ')

@@ -1,7 +1,7 @@
 # The accelerator on a ZCU102, KV260 or ZCU104: from the generated Verilog to a bitstream, with Vivado.
 #
 # THIS SCRIPT WAS NEVER RUN WITH VIVADO: none was at hand. tools/vivado/mock.tcl runs it in tclsh and checks
-# the structure of the block design. Commands are those of UG835 from 2022.1 to 2024.1; no version was tried.
+# the structure of the block design. Its commands stand in UG835 of 2022.1 to 2024.1; no version was tried.
 # Names of parameters and pins of Vivado's IP come from their documentation and from public designs;
 # docs/bitstream.md lists what only Vivado can tell.
 #

@@ -36,7 +36,7 @@ set boards {
 	xck26-sfvc784-2LV-c {kv260_som 0x880000000}
 	xczu7ev-ffvc1156-2-e {zcu104 0x80000000}
 }
-# What an access at a memory port of the processing system reaches, as UG1085 maps the chip's addresses: the name
+# The targets of an access at a memory port of the processing system, as UG1085 maps the chip's addresses: the name
 # in Vivado, first byte, bytes. The DDR ends where the board's does.
 set address_map {
 	DDR_LOW 0x0 0x80000000

@@ -33,7 +33,7 @@ module pgs_control_block_properties (
   input wire        error,
   input wire [7:0]  error_code,
 
-  // Inside: what the properties of a start, an interrupt and a read are about.
+  // Registers inside, for the properties of a start, an interrupt and a read.
   input wire        resets,              // a reset begins
   input wire        resetting,
   input wire        running,
@@ -49,7 +49,7 @@ module pgs_control_block_properties (
   input wire [31:0] flags, time_step, drift, coefficient, friction, damping,
   input wire [31:0] gravity_x, gravity_y, gravity_z, spin_damping,
 
-  // What an induction needs.
+  // Registers inside, for the induction alone.
   input wire        has_address, has_data, whole,
   input wire [11:0] write_address,
   input wire [31:0] write_data,
@@ -107,7 +107,7 @@ module pgs_control_block_properties (
     assume (~error | (error_code != 0));
   end
 
-  // ---- Requests that are open, and what they ask for
+  // ---- Open requests: their addresses and words
 
   reg        address_waits, word_waits;  // taken, without effect yet
   reg        answers, reads;             // a response is owed
@@ -138,7 +138,7 @@ module pgs_control_block_properties (
     // A read is answered in the third cycle behind its address.
     if (reads) assert ({1'b0, read_s1} + {1'b0, read_s2} + {1'b0, rvalid} == 2'd1);
     else assert (~read_s1 & ~read_s2 & ~rvalid);
-    // What the module knows of a request is what was asked for.
+    // The module keeps the address and the word of each request.
     assert ({has_address, has_data, reading} == {address_waits, word_waits, reads});
     if (has_address) assert (write_address == address);
     if (has_data) assert ({whole, write_data[2:0]} == {all_strobes, word});
@@ -214,7 +214,7 @@ module pgs_control_block_properties (
 
   // ---- Reads
 
-  // Any one argument keeps what was written to it while no step ran.
+  // An argument keeps the last word that was written to it while no step ran. The solver picks the argument.
   (* anyseq *) reg [11:0] any_place;
   reg  [11:0] place;
   reg [1:0] kept, of_place;
@@ -246,7 +246,7 @@ module pgs_control_block_properties (
   end
   always @* if (reset_before) assert (of_place == kept);
 
-  // What is read is the value two cycles earlier: the word of one register, selected a cycle earlier.
+  // A read gives the value of two cycles earlier: the word of one register, selected a cycle earlier.
   wire [1:0]  selected = argument_read[1:0] | state_read[1:0] | capability_read[1:0] | result_read[1:0];
   wire        of_kept    = (asked == place) & is_argument;
   reg  [1:0]  kept_s1, kept_s2;

@@ -1,7 +1,8 @@
 // Properties of both FIFOs: every word that is pushed comes out once, in order and unchanged, and the counts
 // are right at all times.
 //
-// A solver picks any one word as it is pushed and follows it: what holds for this word holds for all.
+// The solver picks a word as it is pushed and follows it. It may pick any, so that a property of this word holds for
+// all.
 `default_nettype none
 
 module pgs_fifo_properties #(
@@ -54,7 +55,7 @@ module pgs_fifo_properties #(
   end
 
   always @(posedge clk) if (begun) begin
-    // No word is lost and none is invented: there are as many as were pushed and not popped.
+    // The count is the number of words that were pushed and not popped yet.
     assert (count == words);
     assert (words <= FULL);
     assert (some == (words != 0));

@@ -1,8 +1,7 @@
 // Properties of the issue in the order of the stream (specification, section 8): no collision enters a pass within
-// a window of another one that writes one of its bodies, none is lost or issued twice, and none waits for
-// nothing.
+// a window of another one that writes one of its bodies, each one issues once, and none waits without a hazard.
 //
-// A solver picks any one body and follows it, through passes of either kind.
+// The solver picks a body and follows it, through passes of either kind.
 `default_nettype none
 
 module pgs_issue_properties #(

@@ -87,7 +87,7 @@ module pgs_receiver_properties (
   wire       over   = (packet > poses) | (none & (packet == poses));
   wire       its_last = taken + 4'd1 == beats(packet);
   wire       takes  = tvalid & tready & running;
-  reg        wrong;                      // a beat was wrong: what follows has no meaning
+  reg        wrong;                      // a beat was wrong, so that later beats have no meaning
   wire       is_wrong = (tlast != its_last) | ~&tkeep;
   always @(posedge clk) begin
     if (~running) begin

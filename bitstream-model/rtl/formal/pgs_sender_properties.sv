@@ -1,8 +1,8 @@
 // Properties of a stream out: the rules of AXI4-Stream, rows in order, TLAST with the last row and nowhere else,
 // and credits that keep the FIFO from running over.
 //
-// The user is that of stream 0, which has the most kinds of rows. What is asked of it here is what
-// pgs_issue, pgs_queue, pgs_issue_numbers and pgs_integrator do.
+// The user is the one of stream 0, which has the most kinds of rows. The assumptions about it are the rules that
+// pgs_issue, pgs_queue, pgs_issue_numbers and pgs_integrator follow.
 `default_nettype none
 
 module pgs_sender_properties #(

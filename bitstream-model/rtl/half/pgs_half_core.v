@@ -78,7 +78,7 @@ module pgs_half_core (
     .pairs(pairs), .odd(odd), .last_bodies(last_bodies)
   );
 
-  // Passes of the step: a kind that has any has a warm one more. Without collisions there are none.
+  // Passes of the step. A kind with passes has a warm pass in front of them. A step without collisions has no pass.
   reg [8:0] contact_passes, friction_passes;
   reg [9:0] passes;
   reg       no_contacts;
@@ -257,7 +257,7 @@ module pgs_half_core (
 
   // The beats and the found facts of a pair, for the three cycles of its slot, and longer if the second collision
   // waits. Cycle 0 of a pipeline is the first of them.
-  reg  [767:0]  early;                 // beats 0, 1 of streams 0 and 1, and those of stream 2
+  reg  [767:0]  early;                 // beats 0 and 1 of each stream
   reg  [1023:0] rows;                  // 14 rows of 64 bits, and two of impulses
   reg  [4*BODY-1:0] early_bodies, pair_bodies;
   reg  [3:0]    early_moves, moves;

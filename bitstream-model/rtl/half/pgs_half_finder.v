@@ -1,5 +1,5 @@
 // Looks up, for each pair of collisions before it may be issued, the mass properties of its bodies and the last
-// collision before each that used one of them; and refuses what no pass can carry out.
+// collision before each that used one of them; and refuses a collision that no pass can carry out.
 //
 // The finder runs ahead of the issue, in the order of the records and without waiting: the first collision of a pair in
 // one cycle, the second in the next one. A memory holds for each body {parity of the pass, number of the collision} of
@@ -53,8 +53,8 @@ module pgs_half_finder #(
 `include "pgs_interface.vh"
 
   // The words of the records, shortened. An extra bit keeps an index that is too long for a body's number; a count that
-  // is too large for three bits becomes 7. Rows 0 to 3 are in the first two beats of stream 0, and rows 6 to 9 in those
-  // of stream 1.
+  // is too large for three bits becomes 7. Rows 0 to 3 are in the first two beats of stream 0, and rows 6 to 9 in the
+  // first two of stream 1.
   function [2:0] count_of(input [15:0] word);
     count_of = (|word[15:3]) ? 3'd7 : word[2:0];
   endfunction

@@ -93,7 +93,7 @@ module pgs_half_integrator #(
     end
   end
 
-  // What belongs to a group waits for its velocities.
+  // The poses of a group wait for its velocities.
   reg [559:0] pose;
   wire [111:0] poses_in [0:2];
   wire [2:0]   unused_words;

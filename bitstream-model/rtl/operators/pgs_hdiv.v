@@ -98,7 +98,7 @@ module pgs_hdiv (
     row = {doubled, ~add_back} - {{1'b0, by} ^ {12{add_back}}, 1'b1};
   endfunction
 
-  // Stages 3 to 9. Slot g of `remainder` and of `quotient` is what stage g + 3 leaves.
+  // Stages 3 to 9. Slot g of `remainder` and of `quotient` has the result of stage g + 3.
   reg [12*STAGES-1:0] remainder;
   reg [13*STAGES-1:0] quotient;
 

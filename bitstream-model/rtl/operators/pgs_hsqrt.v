@@ -78,7 +78,7 @@ module pgs_hsqrt (
   // radicand, and subtracts 4 root + 1 from a remainder that is not negative, or adds 4 root + 3 to
   // one that is: that subtracts the root, or its complement, followed by 01.
   //
-  // Slot g of `roots` and of `remainders` is what the rows 2 g - 2 and 2 g - 1 leave, the root with
+  // Slot g of `roots` and of `remainders` has the results of the rows 2 g - 2 and 2 g - 1, the root with
   // a zero in front: 2 g + 1 bits of root and 2 g + 2 bits of remainder.
   reg [STAGES*STAGES-1:0]     roots;
   reg [STAGES*(STAGES+1)-1:0] remainders;

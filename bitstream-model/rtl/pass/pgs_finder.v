@@ -1,5 +1,5 @@
 // Looks up, for each collision before it may be issued, the mass properties of its bodies and the
-// last collision before it that used one of them; and refuses what no pass can carry out.
+// last collision before it that used one of them; and refuses a collision that no pass can carry out.
 //
 // The finder runs ahead of the issue, in the order of the records and without waiting. A memory
 // holds for each body {parity of the pass, number of the collision} of its last use: read in a cycle

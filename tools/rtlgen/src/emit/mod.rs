@@ -3,6 +3,7 @@
 //! hand-written modules need of it. The block design of Vivado gets its numbers likewise.
 
 mod headers;
+mod nets;
 mod solver;
 mod text;
 mod vivado;

@@ -1,7 +1,7 @@
 //! Pipelines on one pool of units, as a Verilog module.
 //!
-//! Every value has the name of its node, behind the name of its pipeline where there are more than
-//! one. The unit that computes it drives it in one cycle of each interval. A value that is read later goes through a chain of
+//! Every value has the name of its node, behind the name of its pipeline. The unit that computes it
+//! drives it in one cycle of each interval. A value that is read later goes through a chain of
 //! delays, and `name_d3` is the value 3 intervals later. A chain belongs to an input, or to a phase
 //! of a unit: contact and friction passes never run together, so that they share it.
 //!
@@ -20,6 +20,7 @@ use crate::graph::{Input, Kind, NodeId, Operand, Output};
 use crate::number;
 use crate::pool::{self, Unit};
 
+use super::nets::{Net, Value, nets, slots, taps};
 use super::text::{Text, line};
 
 /// Copies that follow the same register.
@@ -55,85 +56,15 @@ pub(super) fn module(pipelines: &[&Pipeline; 3], smallest_normal: bool) -> Strin
     format!("{}{}endmodule\n\n`default_nettype wire\n", text.into_string(), body.into_string())
 }
 
-/// For each pipeline and node the net that carries its value as it comes.
-fn nets(pipelines: &[&Pipeline], units: &[Unit]) -> Vec<Vec<Net>> {
-    let nets = pipelines.iter().enumerate().map(|(number, pipeline)| {
-        let Pipeline { graph, schedule, .. } = pipeline;
-        let net = |id: NodeId| Net {
-            driver: graph.node(id).name.clone(),
-            interval: schedule.interval,
-            phase: schedule.phase(schedule.ready(graph, id)),
-            is_input: true,
-        };
-        let mut nets: Vec<Net> = graph.ids().map(net).collect();
-        for unit in units {
-            for used in unit.of(number) {
-                let net = &mut nets[used.node.index()];
-                (net.driver, net.is_input) = (unit.name(graph.precision()), false);
-            }
-        }
-        nets
-    });
-    nets.collect()
-}
-
-/// A net that carries a value as it comes, in one cycle of each interval.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Net {
-    /// A unit, or an input.
-    driver: String,
-    /// Cycles from a value to the next.
-    interval: i32,
-    /// The phase in which the value comes.
-    phase: usize,
-    is_input: bool,
-}
-
-/// For each value the numbers of intervals after which it is read.
-fn taps(pipelines: &[&Pipeline]) -> BTreeMap<Value, BTreeSet<i32>> {
-    let mut taps = BTreeMap::<_, BTreeSet<i32>>::new();
-    for (number, pipeline) in pipelines.iter().enumerate() {
-        let Pipeline { graph, schedule, .. } = pipeline;
-        let mut read = |operand: &Operand, cycle: i32| {
-            let gate = operand.gate.map(|gate| (gate, false));
-            for (node, upper) in [Some((operand.node, operand.upper)), gate].into_iter().flatten() {
-                if !graph.node(node).kind.is_still() {
-                    let slots = slots(pipeline, node, cycle);
-                    taps.entry((number, node, upper)).or_default().insert(slots);
-                }
-            }
-        };
-        for id in graph.ids() {
-            for operand in &graph.node(id).operands {
-                read(operand, schedule.starts[id.index()]);
-            }
-        }
-        for operand in graph.outputs().iter().flat_map(|output| &output.operands) {
-            read(operand, schedule.depth);
-        }
-    }
-    taps
-}
-
-/// Intervals for which a value waits that is read at `cycle`.
-fn slots(pipeline: &Pipeline, node: NodeId, cycle: i32) -> i32 {
-    let Pipeline { graph, schedule, .. } = pipeline;
-    let late = cycle - schedule.ready(graph, node);
-    late.div_euclid(schedule.interval) + i32::from(late % schedule.interval != 0)
-}
-
 /// `[31:0] ` of 32 bits; nothing of one.
 fn range(width: u32) -> String {
     if width == 1 { String::new() } else { format!("[{}:0] ", width - 1) }
 }
 
-/// A value of a pipeline: its node, and whether it is the upper one of two.
-type Value = (usize, NodeId, bool);
-
 struct Emitter<'a> {
     /// Of all numbers.
     precision: Precision,
-    pipelines: &'a [&'a Pipeline],
+    pipelines: &'a [&'a Pipeline; 3],
     smallest_normal: bool,
     /// For each pipeline, by node.
     nets: Vec<Vec<Net>>,
@@ -181,7 +112,7 @@ impl Emitter<'_> {
         let Pipeline { name, graph, .. } = self.pipelines[pipeline];
         let node = graph.node(node);
         let prefix = match node.kind {
-            Kind::Operation(_) if self.pipelines.len() > 1 => format!("{name}_"),
+            Kind::Operation(_) => format!("{name}_"),
             _ => String::new(),
         };
         format!("{prefix}{}{}", node.name, if upper { "_upper" } else { "" })
@@ -270,10 +201,8 @@ impl Emitter<'_> {
         }
         line!(text, "`default_nettype none\n");
         line!(text, "module pgs_solver (\n  input wire clk,");
-        if self.phases() > 1 {
-            line!(text, "  input wire [{}:0] phase,", self.phases() - 1);
-        }
-        for selector in SELECTORS.iter().take(self.pipelines.len() - 1) {
+        line!(text, "  input wire [{}:0] phase,", self.phases() - 1);
+        for selector in SELECTORS {
             line!(text, "  input wire {selector},");
         }
         for (pipeline, input) in self.input_ports() {
