@@ -100,7 +100,7 @@ fn the_commands_of_the_documents_print_what_these_show() {
         .collect();
     let expected = [
         ("README.md", "solve"),
-        ("docs/board.md", "check"),
+        ("docs/to-a-board.md", "check"),
         ("docs/faults.md", "solve"),
         ("docs/worth.md", "thesis"),
     ];
