@@ -183,10 +183,23 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
+/// The pages outside `docs` that belong to the documentation, beside `README.md`.
+const BESIDE: [&str; 3] =
+    ["device-tree/README.md", "bitstream-model/README.md", "bitstream-model/rtl/README.md"];
+
+#[test]
+fn the_documentation_is_twelve_pages_and_short() {
+    let pages = documents();
+    assert!(pages.len() <= 1 + 12, "{pages:?}");
+    let pages = pages.into_iter().chain(BESIDE.map(str::to_owned));
+    let words: usize = pages.map(|page| text(&page).split_whitespace().count()).sum();
+    assert!(words <= 24_000, "{words} words: shorten a page before another one grows");
+}
+
 #[test]
 fn every_link_of_the_documents_leads_to_a_file_and_to_a_heading() {
     let mut links = 0;
-    for document in documents() {
+    for document in documents().into_iter().chain(BESIDE.map(str::to_owned)) {
         let text = text(&document);
         let path = root().join(&document);
         let folder = path.parent().expect("a folder");
