@@ -106,7 +106,6 @@ fn compiled(source: &str, folder: &Path) -> Option<PathBuf> {
 fn every_printed_recipe_names_an_overlay_for_the_bitstream_that_can_be_built() {
     let recipes = recipes();
     for (place, by) in [
-        ("README.md: ", By::Pgs),
         ("docs/to-a-board.md: ", By::Pgs),
         ("docs/packages.md: ", By::Pgs),
         ("device-tree/README.md: ", By::Pgs),
