@@ -27,7 +27,7 @@ Examples:
   pgs serve --socket /tmp/board --memory-mib 256 --board emulated:half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
 One driver at a time has the board, with new memory of its own; a connection that says nothing for

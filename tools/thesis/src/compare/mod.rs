@@ -23,7 +23,7 @@ Examples:
   pgs thesis compare half,f32 half --steps 300 --every 10 --json
   pgs thesis compare float,world float,world,unchecked --scene shapes --grid 8x8x8
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs thesis compare float float --grid 2x2x2 --steps 3 --accelerator \
   rtl:rtl-sim/pgs-rtl
 

@@ -36,7 +36,7 @@ Examples:
   pgs faults --json > faults.json
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs faults --accelerator rtl:rtl-sim/pgs-rtl     stream faults, on the generated hardware too
 
 Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go \
