@@ -7,7 +7,7 @@ MuJoCo takes N steps of the model (200; without --model, 60 boxes, spheres and c
 detects its contacts. The folder then has one step with these bodies and contacts, as `pgs solve` reads it:
 
     step_folder.py --out contacts
-    pgs solve contacts --inertia world
+    pgs solve contacts --board emulated:float,world
 
 Free bodies only: a body with another joint is refused, because its joint is not part of the step. The
 contacts of a pair of bodies that share a normal become one collision, up to four points each. A step has one
