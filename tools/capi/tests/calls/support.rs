@@ -62,6 +62,10 @@ pub(crate) fn arrays(bodies: &mut [Crate]) -> BodyArrays {
         linear_velocities: column(std::mem::offset_of!(Crate, linear)),
         angular_velocities: column(std::mem::offset_of!(Crate, angular)),
         shapes: StridedConst { data: shapes.data, stride },
+        table: null(),
+        table_count: 0,
+        number_size: 0,
+        origin: [0.0; 3],
     }
 }
 
