@@ -124,8 +124,8 @@ pub unsafe extern "C" fn zpgs_set_shapes(
     })
 }
 
-/// Fills in the parameters of a step: Bullet's, at 60 steps a second. `size` is
-/// `sizeof(zpgs_parameters)`.
+/// Fills in the parameters of a step: Bullet's at 60 steps a second, without damping of spin.
+/// `size` is `sizeof(zpgs_parameters)`.
 ///
 /// # Safety
 /// `parameters` is null or the address of `size` bytes that no other thread uses during the call.
