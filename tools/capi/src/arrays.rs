@@ -67,6 +67,26 @@ pub struct BodyArrays {
     pub origin: [f64; 3],
 }
 
+impl Default for BodyArrays {
+    /// No bodies.
+    fn default() -> Self {
+        let none = Strided { data: std::ptr::null_mut(), stride: 0 };
+        Self {
+            size: size_of::<Self>(),
+            count: 0,
+            positions: none,
+            orientations: none,
+            linear_velocities: none,
+            angular_velocities: none,
+            shapes: StridedConst { data: std::ptr::null(), stride: 0 },
+            table: std::ptr::null(),
+            table_count: 0,
+            number_size: 0,
+            origin: [0.0; 3],
+        }
+    }
+}
+
 /// The collisions of a step, in the caller's own memory.
 ///
 /// During a call no thread writes them. A step refuses them where they share a byte with the

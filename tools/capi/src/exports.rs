@@ -437,22 +437,8 @@ pub(crate) unsafe fn read_parameters(
 pub(crate) unsafe fn read_bodies<'a>(
     pointer: *const BodyArrays,
 ) -> Result<BodiesView<'a>, Failure> {
-    const NONE: Strided = Strided { data: std::ptr::null_mut(), stride: 0 };
-    let nothing = BodyArrays {
-        size: 0,
-        count: 0,
-        positions: NONE,
-        orientations: NONE,
-        linear_velocities: NONE,
-        angular_velocities: NONE,
-        shapes: StridedConst { data: std::ptr::null(), stride: 0 },
-        table: std::ptr::null(),
-        table_count: 0,
-        number_size: 0,
-        origin: [0.0; 3],
-    };
     // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
-    let arrays = unsafe { memory::read(pointer, nothing) }?;
+    let arrays = unsafe { memory::read(pointer, BodyArrays::default()) }?;
     // SAFETY: the arrays are as the structure describes: `# Safety` of this function.
     unsafe { BodiesView::new(arrays) }
 }

@@ -50,7 +50,7 @@ struct Cli {
 }
 
 /// Options of `run`, also without the verb, that `-h` shows, in two screens; `--help` shows all.
-const SHORT: [&str; 17] = [
+const SHORT: [&str; 15] = [
     "steps",
     "scene",
     "grid",
@@ -62,8 +62,6 @@ const SHORT: [&str; 17] = [
     "warm_start",
     "order",
     "board",
-    "profile",
-    "hazards",
     "threads",
     "fault",
     "view",
@@ -123,11 +121,16 @@ pub(crate) fn parse(
 mod tests {
     use bitstream_model::interface::address_map::UIO_NODE;
     use clap::error::ErrorKind;
+    use zynq_pgs::BoardChoice;
     use zynq_pgs::platform::{ManagerChoice, MemoryChoice};
 
     use super::*;
-    use pgs_command::common::BoardName;
     use pgs_command::environment::{BOARD, MEMORY};
+
+    /// Whether that is the UIO node of this name.
+    fn is_uio(board: &BoardChoice, name: &str) -> bool {
+        matches!(board, BoardChoice::Uio { node } if node == name)
+    }
 
     fn parsed(line: &str) -> Result<Command, ErrorKind> {
         parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
@@ -147,12 +150,12 @@ mod tests {
     #[test]
     fn the_environment_says_what_the_command_line_does_not() {
         let common = parsed_in("uio", "uio:m", "pgs run").expect("both");
-        assert_eq!(common.board, BoardName::Uio(UIO_NODE.to_owned()));
+        assert!(is_uio(&common.board, UIO_NODE));
         assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() });
         assert!(common.memory_of_environment);
         let common = parsed_in("uio", "uio:m", "pgs run --board devmem --memory uio:n");
         let common = common.expect("neither");
-        assert_eq!(common.board, BoardName::Devmem);
+        assert!(matches!(common.board, BoardChoice::DevMem(_)));
         assert_eq!(common.memory, MemoryChoice::Uio { node: "n".to_owned() });
         assert!(!common.memory_of_environment);
     }
@@ -162,7 +165,7 @@ mod tests {
         for blank in ["", " ", "	 "] {
             for line in ["pgs", "pgs run", "pgs list --json"] {
                 let common = parsed_in(blank, blank, line).expect("as if unset");
-                assert_eq!(common.board, BoardName::Auto, "{line}");
+                assert!(matches!(common.board, BoardChoice::Automatic), "{line}");
                 assert_eq!(common.memory, MemoryChoice::Automatic, "{line}");
             }
         }
@@ -171,7 +174,10 @@ mod tests {
     #[test]
     fn a_wrong_variable_is_named_and_breaks_nothing_that_does_without() {
         let said = parsed_in("abacus", "", "pgs run").expect_err("no board");
-        assert!(said.contains("PGS_BOARD is \"abacus\": expected auto"), "{said}");
+        assert!(
+            said.contains("PGS_BOARD is \"abacus\": found \"abacus\" as a board: give auto"),
+            "{said}"
+        );
         assert!(said.contains("give --board"), "{said}");
         let said = parsed_in("uio", "drum", "pgs run").expect_err("no memory");
         assert!(
@@ -220,7 +226,7 @@ mod tests {
             let common = parsed(line).expect(line).common;
             assert!(common.json, "{line}");
             assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() }, "{line}");
-            assert_eq!(common.board, BoardName::Emulated, "{line}");
+            assert!(matches!(common.board, BoardChoice::Built(_)), "{line}");
             assert_eq!(common.manager, ManagerChoice::Device("fpga2".to_owned()), "{line}");
         }
     }
@@ -229,10 +235,11 @@ mod tests {
     fn a_board_is_named_by_its_node_as_memory_is() {
         let board =
             |text: &str| parsed(&format!("pgs check --board {text}")).map(|c| c.common.board);
-        let uio = |node: &str| Ok(BoardName::Uio(node.to_owned()));
-        assert_eq!(board("uio"), uio("pgs"));
-        assert_eq!(board("uio:pgs@a0000000"), uio("pgs@a0000000"));
-        assert_eq!(board("uio:a:b"), uio("a:b"));
+        for (text, node) in
+            [("uio", "pgs"), ("uio:pgs@a0000000", "pgs@a0000000"), ("uio:a:b", "a:b")]
+        {
+            assert!(is_uio(&board(text).expect(text), node), "{text}");
+        }
     }
 
     #[test]
@@ -245,8 +252,8 @@ mod tests {
     #[test]
     fn a_served_board_is_named_by_its_socket() {
         let common = parsed("pgs run --board socket:/a/b").expect("a board").common;
-        assert_eq!(common.board, BoardName::Socket("/a/b".into()));
-        let served = parsed("pgs serve --socket x --profile half").expect("a board");
+        assert!(matches!(common.board, BoardChoice::Served { socket } if socket.ends_with("b")));
+        let served = parsed("pgs serve --socket x --board emulated:half").expect("a board");
         assert!(matches!(served.verb, Verb::Serve(args) if args.socket.ends_with("x")));
     }
 
@@ -254,10 +261,11 @@ mod tests {
     #[test]
     fn options_of_a_board_belong_to_verbs_that_open_one() {
         for verb in ["faults", "serve --socket x", "thesis half", "thesis compare float half"] {
-            for option in ["--board uio", "--memory uio", "--manager fpga0"] {
+            for option in ["--memory uio", "--manager fpga0"] {
                 let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
                 assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
             }
+            parsed(&format!("pgs {verb} --board uio")).expect_err(verb);
             parsed(&format!("pgs {verb} --accelerator rtl:x")).expect(verb);
         }
         for verb in ["thesis step", "thesis ladder", "thesis detection --input x", "load x"] {
@@ -267,9 +275,10 @@ mod tests {
             }
         }
         let real = parsed_in("uio", "uio:m", "pgs thesis formats").expect("a board");
-        assert_eq!(real.board, BoardName::Uio(UIO_NODE.to_owned()));
+        assert!(is_uio(&real.board, UIO_NODE));
         for line in ["pgs faults", "pgs thesis half", "pgs thesis step", "pgs serve --socket x"] {
-            assert_eq!(parsed_in("uio", "uio:m", line).expect(line).board, BoardName::Auto);
+            let own = parsed_in("uio", "uio:m", line).expect(line).board;
+            assert!(matches!(own, BoardChoice::Automatic), "{line}");
         }
     }
 
@@ -278,7 +287,7 @@ mod tests {
         assert_eq!(parsed("pgs --board uio list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(
-            parsed("pgs --hazards unchecked solve x").expect_err("stray"),
+            parsed("pgs --threads 1 solve x").expect_err("stray"),
             ErrorKind::ArgumentConflict
         );
     }
@@ -292,11 +301,7 @@ mod tests {
             "pgs --grid 0x1x1",
             "pgs --drop nan",
             "pgs --drop -1",
-            "pgs --window 0",
-            "pgs --window 99999999999",
-            "pgs --bandwidth 0",
-            "pgs --bandwidth inf",
-            "pgs --bandwidth -3",
+            "pgs --threads 0",
             "pgs --report-every 0",
             "pgs --memory udmabuf",
             "pgs --memory file:",

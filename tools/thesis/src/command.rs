@@ -5,6 +5,7 @@ use std::io::Write;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs, Given};
 use pgs_command::failure::{Failure, Result, Verdict};
+use pgs_command::options::build::ThreadsArgs;
 use serde_json::json;
 
 use crate::experiment::{Boards, Experiment, SCHEMA};
@@ -72,9 +73,9 @@ impl Args for ThesisArgs {
             let command = match experiment.boards {
                 Boards::None => command,
                 Boards::Own => AcceleratorOptions::augment_args(command),
-                Boards::Any => {
-                    AcceleratorOptions::augment_args(BoardOptions::augment_args(command))
-                }
+                Boards::Any => AcceleratorOptions::augment_args(ThreadsArgs::augment_args(
+                    BoardOptions::augment_args(command),
+                )),
             };
             // Last, because options bring texts of their own.
             command.about(experiment.about).long_about(None)
@@ -134,6 +135,7 @@ impl ThesisArgs {
             board: has(Boards::Any).and_then(|_| BoardOptions::from_arg_matches(options).ok()),
             accelerator: has(Boards::Own)
                 .and_then(|_| AcceleratorOptions::from_arg_matches(options).ok()),
+            threads: options.try_get_one("threads").ok().flatten().copied(),
             manager: None,
         }
     }

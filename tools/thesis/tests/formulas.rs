@@ -19,7 +19,7 @@ fn step(
     let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a scene");
     let build = Build { profile: Some(profile), bandwidth: Some(bandwidth), ..Build::default() };
-    let board = BoardChoice::Built(build.config());
+    let board = BoardChoice::Built(build);
     let mut accelerator =
         Accelerator::open(OpenOptions { board, ..OpenOptions::default() }).expect("a board");
     accelerator.set_shapes(scene.shapes()).expect("shapes");

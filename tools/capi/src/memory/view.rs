@@ -255,10 +255,7 @@ mod tests {
             linear_velocities: column(8),
             angular_velocities: column(11),
             shapes: StridedConst { data: shapes.as_ptr().cast(), stride: 4 },
-            table: std::ptr::null(),
-            table_count: 0,
-            number_size: 0,
-            origin: [0.0; 3],
+            ..BodyArrays::default()
         }
     }
 

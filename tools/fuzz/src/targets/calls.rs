@@ -145,10 +145,7 @@ impl Bodies {
             linear_velocities: linear.strided(),
             angular_velocities: angular.strided(),
             shapes: shapes.constant(),
-            table: ptr::null(),
-            table_count: 0,
-            number_size: 0,
-            origin: [0.0; 3],
+            ..BodyArrays::default()
         };
         Self { columns, shapes, structure: Sized::any(input, arrays) }
     }

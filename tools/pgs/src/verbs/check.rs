@@ -8,13 +8,14 @@ use bitstream_model::{
 };
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use zynq_pgs::board::BoardKind;
 use zynq_pgs::check::{CheckLine, Outcome};
+use zynq_pgs::emulation::Build;
 use zynq_pgs::{CheckReport, check};
 
 use pgs_command::board::{self, ChosenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
-use pgs_command::failure::{Result, Verdict};
-use pgs_command::options::build::{BuildArgs, board_option};
+use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::SCHEMA;
 use pgs_command::output::facts::labelled;
 use pgs_command::output::width::of_terminal;
@@ -23,7 +24,7 @@ const EXAMPLES: &str = "\
 Examples:
   pgs check --board emulated --json
   pgs check --board emulated --quirk stale     see what a failure looks like
-  pgs check --board emulated --fence 0x50000000+64M   DMA cores that reach this memory alone
+  pgs check --board emulated:float,fence=0x50000000+64M   DMA cores that reach this memory alone
 
 Examples on a board:
   pgs check
@@ -40,8 +41,6 @@ pub(crate) struct CheckArgs {
     /// Build the emulated board with a defect, to see how the test reports it
     #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
     quirk: Option<QuirkName>,
-    #[command(flatten)]
-    build: BuildArgs,
     #[command(flatten)]
     pub(crate) board: BoardOptions,
     #[command(flatten)]
@@ -103,19 +102,14 @@ impl QuirkName {
 }
 
 impl CheckArgs {
-    fn config(&self) -> BoardConfig {
+    fn config(&self, build: &Build) -> BoardConfig {
         let quirks = self.quirk.map(QuirkName::quirks).unwrap_or_default();
-        let config = self.build.build().config();
+        let config = build.config();
         // These two are about a fence.
         let needs = matches!(self.quirk, Some(QuirkName::OpenFence | QuirkName::NoGuard));
         let fence = config.fence.or(needs.then(Fence::default));
         let queue = if quirks.queue.is_some() { Some(0) } else { config.queue };
         BoardConfig { quirks, fence, queue, ..config }
-    }
-
-    /// The first given option that only an emulated board has.
-    fn board_option(&self) -> Option<String> {
-        self.quirk.map(|_| "--quirk".to_owned()).or_else(|| board_option(&self.build.build()))
     }
 }
 
@@ -123,7 +117,11 @@ impl CheckArgs {
 pub(crate) fn run(args: &CheckArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     board::require(common)?;
     let ChosenBoard { kind, options, reason, .. } =
-        board::find(common, args.config(), args.board_option())?;
+        board::find(common, args.config(&common.build()))?;
+    if args.quirk.is_some() && kind != BoardKind::Emulated {
+        let error = "--quirk builds an emulated board, but this one is there already";
+        return Err(Failure::input(error).next("leave out --quirk, or add --board emulated"));
+    }
     let report = check(options).map_err(board::unusable)?;
     let kind = board::kind_text(kind);
     if common.json {

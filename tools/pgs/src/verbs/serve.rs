@@ -15,7 +15,7 @@ use pgs_command::common::{AcceleratorOptions, CommonArgs};
 use pgs_command::failure::{Cause, Failure, Result, Verdict};
 use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
-use pgs_command::options::build::{BuildArgs, described};
+use pgs_command::options::build::{BuiltArgs, described};
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::output::SCHEMA;
 use pgs_command::output::files::{Files, Named};
@@ -24,10 +24,10 @@ const EXAMPLES: &str = "\
 Examples:
   pgs serve --socket /tmp/board                   in one terminal
   pgs --board socket:/tmp/board                   in another
-  pgs serve --socket /tmp/board --memory-mib 256 --profile half
+  pgs serve --socket /tmp/board --memory-mib 256 --board emulated:half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
 One driver at a time has the board, with new memory of its own; a connection that says nothing for
@@ -50,7 +50,7 @@ pub(crate) struct ServeArgs {
     )]
     memory_mib: u64,
     #[command(flatten)]
-    build: BuildArgs,
+    built: BuiltArgs,
     #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
@@ -70,13 +70,13 @@ struct Tally {
 pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
-    let mut config = BoardConfig { strict: false, ..args.build.build().config() };
+    let mut config = BoardConfig { strict: false, ..args.built.board.unwrap_or_default().config() };
     let planned = args.planned.plan(&config, &StepParameters::thesis());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let bytes = args.memory_mib << 20;
     if let Some(fence) = config.fence.filter(|fence| !fence.contains(MEMORY_BASE, bytes)) {
         let error = format!("{bytes} bytes of memory at {MEMORY_BASE:#x} reach out of {fence}");
-        return Err(Failure::input(error).next("give a smaller --memory-mib, or another --fence"));
+        return Err(Failure::input(error).next("give a smaller --memory-mib, or another fence"));
     }
     let memory = MEMORY_BASE..MEMORY_BASE + bytes;
     let mut server =

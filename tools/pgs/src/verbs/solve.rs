@@ -17,7 +17,7 @@ use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::numbers::{Bound, grouped};
-use pgs_command::options::build::BuildArgs;
+use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
@@ -38,9 +38,8 @@ const EXAMPLES: &str = "\
 Examples:
   pgs solve tests/golden/one_cube --compare
   pgs solve tests/golden/pile5_step60 --out result --digest
-  pgs solve tests/golden/pile5_step60 --hazards unchecked --verify
+  pgs solve tests/golden/pile5_step60 --board emulated:float,unchecked --verify
   pgs solve tests/golden/one_cube --vcd step.vcd --trace step.json --timeline step.svg
-  pgs solve tests/golden/pile5_step60 --compare --length-width 14 --address-width 32
   pgs solve tests/golden/one_cube --compare --contact-iterations 2 --friction-iterations 0 \\
       --no-integrate
 
@@ -107,13 +106,13 @@ pub(crate) struct SolveArgs {
     #[command(flatten)]
     faults: FaultArgs,
     #[command(flatten)]
-    build: BuildArgs,
-    #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
     traced: TracedArgs,
     #[command(flatten)]
     pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
     #[command(flatten)]
     pub(crate) accelerator: AcceleratorOptions,
 }
@@ -168,7 +167,7 @@ pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) ->
         true => expected(&folder, &parameters)?,
         false => Vec::new(),
     };
-    let mut opened = board::open(common, &args.build.build())?;
+    let mut opened = board::open(common, common.build().config())?;
     folder.check_shapes(opened.accelerator.capabilities().shapes_max()).map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
     let tracing = args.traced.tracing(&opened)?;

@@ -47,7 +47,7 @@ fn a_board_of_the_environment_that_is_not_taken_is_named() {
     };
     let own = "PGS_BOARD is \"uio\": this command builds emulated boards of its own";
     let half = ["thesis", "half", "--grid", "1x1x1", "--steps", "1", "--build", "half"];
-    for words in [&["faults", "--list", "--profile", "naive"][..], &half] {
+    for words in [&["faults", "--list", "--board", "emulated:naive"][..], &half] {
         assert!(said(words, "uio").contains(own), "{words:?}");
         for same in ["", "auto", "emulated"] {
             assert_eq!(said(words, same), "", "{words:?}");

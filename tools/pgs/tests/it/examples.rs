@@ -306,7 +306,7 @@ fn every_printed_command_runs_in_a_clone_or_names_its_need() {
                 || need
                     .strip_prefix("stage=")
                     .is_some_and(|stage| check.contains(&format!("\n\t[{stage}]=")))
-                || ["on a board", "with the Verilog in simulation (docs/bitstream.md)"]
+                || ["on a board", "with the Verilog in simulation (docs/to-a-board.md)"]
                     .contains(&need.as_str());
             assert!(known, "no such need: {example}");
         } else if is_form(command) || command.starts_with("pgs load ") {

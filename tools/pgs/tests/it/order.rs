@@ -85,7 +85,8 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
 /// A board without a queue takes the cheaper order of each step, and each step's report names it.
 #[test]
 fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
-    let scene = ["run", "--profile", "half", "--grid", "1x3x1", "--steps", "80", "--drop", "0.3"];
+    let scene = "run --board emulated:half --grid 1x3x1 --steps 80 --drop 0.3";
+    let scene: Vec<&str> = scene.split(' ').collect();
     let ran = run([&["--json"], &scene[..]].concat());
     let document = ran.json();
     let steps = document["steps"].as_array().expect("steps");
@@ -101,7 +102,7 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
     let text = run(scene).stdout;
     assert!(text.contains(&expected), "{text}");
 
-    let short = ["run", "--hazards", "unchecked", "--grid", "3x3x3", "--steps", "3"];
+    let short = ["run", "--board", "emulated:float,unchecked", "--grid", "3x3x3", "--steps", "3"];
     let one = run([&short[..], &["--order", "hazard-free"]].concat()).stdout;
     assert!(one.contains("order      hazard-free\n") && !one.contains("orders"), "{one}");
 }

@@ -70,6 +70,19 @@ fn a_name_that_is_taken_by_a_folder_leaves_the_other_results() {
     assert_eq!(content(folder.path()), [("out_pos.npy".to_owned(), b"earlier".to_vec())]);
 }
 
+/// A step that misses its deadline.
+const SLOW: [&str; 9] = [
+    "run",
+    "--board",
+    "emulated:float,bandwidth=0.1",
+    "--grid",
+    "6x6x6",
+    "--steps",
+    "1",
+    "--deadline",
+    "1",
+];
+
 #[test]
 fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -77,8 +90,7 @@ fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
     fs::write(&report, "earlier").expect("written");
     let before = content(folder.path());
 
-    let late = ["run", "--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1", "--deadline", "1"];
-    let late = [&late[..], &["--report", text(&report)]].concat();
+    let late = [&SLOW[..], &["--report", text(&report)]].concat();
     let ran = on_a_full_disk(&late);
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
     assert!(ran.stderr.contains("fault.json cannot be written"), "{}", ran.stderr);
@@ -91,8 +103,7 @@ fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
 
 #[test]
 fn a_report_may_go_to_a_device() {
-    let late = ["run", "--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1", "--deadline", "1"];
-    let ran = run(late.iter().chain(&["--report", "/dev/null"]));
+    let ran = run(SLOW.iter().chain(&["--report", "/dev/null"]));
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
     assert!(ran.stderr.contains("for a bug report, see /dev/null"), "{}", ran.stderr);
     assert!(!fs::metadata("/dev/null").expect("there").is_file());

@@ -29,9 +29,9 @@ fn fact(text: &str, label: &str) -> String {
 fn no_line_is_wider_than_a_terminal() {
     for options in [
         "--grid 5x5x5 --steps 40",
-        "--grid 4x4x4 --steps 30 --profile half --arithmetic f32 --hazards unchecked",
-        "--grid 4x4x4 --steps 30 --profile half --verify",
-        "--grid 3x3x3 --steps 3 --scene shapes --inertia world --length-width 14 --retries 2",
+        "--grid 4x4x4 --steps 30 --board emulated:half,f32,unchecked",
+        "--grid 4x4x4 --steps 30 --board emulated:half --verify",
+        "--grid 3x3x3 --steps 3 --scene shapes --board emulated:float,length-width=14 --retries 2",
         "--grid 3x3x3 --steps 9 --fault irq-drop,times=3",
     ] {
         let text = ran(options).stdout;
@@ -87,7 +87,7 @@ fn the_table_and_the_summary_say_what_the_document_says() {
 
 #[test]
 fn the_thesis_is_left_out_where_its_scene_is_not_stepped() {
-    let text = ran("--grid 3x3x3 --steps 2 --scene shapes --inertia world").stdout;
+    let text = ran("--grid 3x3x3 --steps 2 --scene shapes").stdout;
     assert!(!text.contains("\nthesis"), "{text}");
 }
 
@@ -131,7 +131,7 @@ fn a_warm_start_takes_a_pass_more_of_each_kind_and_makes_a_column_stiffer() {
 
 #[test]
 fn shapes_have_a_friction_for_each_pair_and_cubes_have_one() {
-    let shapes = "--scene shapes --inertia world --grid 3x3x3 --steps 60";
+    let shapes = "--scene shapes --grid 3x3x3 --steps 60";
     let (one, own) = (document(&format!("{shapes} --pair-friction=false")), document(shapes));
     assert_ne!(one["digest"], own["digest"]);
     assert_eq!(own["config"]["pair_friction"], true);

@@ -30,7 +30,7 @@ fn the_short_help_of_a_run_fits_two_screens() {
     assert!((20..=48).contains(&lines.len()), "{} lines: {lines:#?}", lines.len());
     assert!(lines.iter().all(|line| line.chars().count() <= 80), "{lines:#?}");
     let long = on_terminal(80, "run --help");
-    for option in ["--length-width", "--manager", "--every", "Examples:"] {
+    for option in ["length-width=BITS", "--manager", "--every", "Examples:"] {
         let has = |lines: &[String]| lines.iter().any(|line| line.contains(option));
         assert!(has(&long) && !has(&lines), "{option}");
     }

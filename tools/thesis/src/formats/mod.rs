@@ -10,7 +10,6 @@ use clap::Args;
 use pgs_command::board;
 use pgs_command::failure::Result;
 use pgs_command::numbers::grouped;
-use pgs_command::options::build::BuildArgs;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::DeadlineArgs;
 use serde_json::json;
@@ -54,7 +53,7 @@ pub(crate) static FORMATS: Experiment = Experiment {
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FormatsArgs {
     /// Take the step from this folder of .npy arrays instead of a scene.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "step"])]
     input: Option<PathBuf>,
     /// Step of the scene whose numbers are measured; the steps before it are taken first.
     #[arg(
@@ -68,8 +67,6 @@ pub(crate) struct FormatsArgs {
     scene: SceneArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
-    #[command(flatten)]
-    build: BuildArgs,
 }
 
 /// Measures the numbers.
@@ -112,8 +109,8 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part> {
 
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>> {
-    let build = args.build.build();
-    let mut opened = board::open_as(&session.common, &build, args.scene.config(&build))?.stated();
+    let build = session.common.build();
+    let mut opened = board::open(&session.common, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;
     let scene = args.scene.build(&build)?;
     let parameters = args.deadline.apply(StepParameters::thesis());

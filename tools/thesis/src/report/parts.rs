@@ -11,7 +11,7 @@ use super::AllArgs;
 use crate::command::experiments;
 use crate::experiment::{Part, shown};
 use crate::session::Session;
-use pgs_command::common::{BoardName, CommonArgs};
+use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::scenes::DROP;
@@ -40,7 +40,7 @@ pub(super) fn gather(args: &AllArgs, common: &CommonArgs, interrupt: &Interrupt)
         bar.set_style(style);
     }
     bar.enable_steady_tick(TICK);
-    let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
+    let common = CommonArgs { board: CommonArgs::emulated().board, ..common.clone() };
     let session = Session::within(&common, interrupt.clone(), bar.clone());
     let gathered = of_all(args, &session, &bar);
     bar.finish_and_clear();

@@ -1,9 +1,9 @@
 //! Figure 4.1: the pile, as a picture and as a page that plays its fall.
 
+use bitstream_model::BoardConfig;
 use clap::Args;
 use scene::Grid;
 use zynq_pgs::StepParameters;
-use zynq_pgs::emulation::Build;
 use zynq_pgs_view::Recording;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
@@ -47,7 +47,7 @@ impl Measure for Options {
     fn measure(&self, session: &Session) -> Result<Part> {
         let grid = self.grid;
         let (mut scene, mut opened) =
-            pile::open(grid, DROP, &session.emulated(), &Build::default())?;
+            pile::open(grid, DROP, &session.emulated(), BoardConfig::default())?;
         session.watch(&mut opened);
         // As `pgs run`, whose defaults the printed command takes.
         let [steps, _] = STEPS;
@@ -81,7 +81,7 @@ impl Measure for Options {
         let mut figure = Figure::new(
             ("figure-4-1", "§4.3, Figure 4.1"),
             format!("A snapshot of the scene: {cubes} after {steps} steps"),
-            Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
+            Picture::of(&recording).svg().map_err(Failure::input)?,
             "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.",
         );
         figure.playback = Some(page(&recording, &title, &facts).map_err(Failure::input)?.html);

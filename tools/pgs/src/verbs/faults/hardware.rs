@@ -4,7 +4,6 @@
 use std::io::Write;
 
 use bitstream_model::Direction;
-use bitstream_model::interface::profile::FLOAT;
 use serde_json::json;
 
 use super::cells::{self, Cell};
@@ -43,11 +42,11 @@ impl Pair {
 
 /// Tries all cells on both.
 pub(super) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
-    let profile = args.profile.unwrap_or(&FLOAT);
-    let bench = Bench::like_simulator(profile)?;
+    let build = args.built.board.unwrap_or_default();
+    let bench = Bench::like_simulator(&build)?;
     let cells = cells::for_simulator(&bench);
     if args.list {
-        return list(&[(profile.name.to_owned(), cells)], common, out);
+        return list(&[(build.to_string(), cells)], common, out);
     }
     // A simulator that cannot be used is refused here, with the reason, and not cell by cell.
     board::emulated_board(bench.config, &common.accelerator)?;

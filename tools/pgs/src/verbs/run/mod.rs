@@ -14,6 +14,7 @@ use clap::Args;
 use scene::{Scene, WarmStart};
 use serde_json::Value;
 use zynq_pgs::board::BoardKind;
+use zynq_pgs::emulation::Build;
 use zynq_pgs::{Capabilities, StepParameters, StepReport};
 
 use self::beside::{Beside, Cold};
@@ -29,7 +30,7 @@ use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
-use pgs_command::options::build::BuildArgs;
+use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::scenes::{ITERATIONS, STEPS, SceneArgs};
@@ -46,17 +47,17 @@ Examples:
   pgs run                                        the thesis' 38,880 cubes
   pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes (inferred)
   pgs run --grid 10x10x10 --steps 600 --report-every 30
-  pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
-  pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
+  pgs run --board emulated:float,unchecked --order as-given     the thesis' design: piles gain energy
   pgs run --order hazard-free --verify
-  pgs run --profile half                          the thesis' design in sixteen bits
+  pgs run --board emulated:half                  the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
-  pgs run --bandwidth unlimited --json > run.json
+  pgs run --board emulated:float,bandwidth=unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
+  pgs run --scene shapes --picture pile.apng     a picture that moves
   pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
@@ -131,11 +132,11 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) board: BoardOptions,
     #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+    #[command(flatten)]
     pub(crate) accelerator: AcceleratorOptions,
     #[command(flatten)]
     faults: FaultArgs,
-    #[command(flatten)]
-    build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
@@ -193,11 +194,17 @@ impl RunArgs {
 
     /// The scene that is stepped beside this one, if one is. A planned fault names a step of the
     /// board by its number, and the steps of a second scene would shift the numbers.
-    fn beside(&self, parameters: &StepParameters, has_sensors: bool) -> Result<Option<Cold>> {
+    fn beside(
+        &self,
+        build: &Build,
+        parameters: &StepParameters,
+        has_sensors: bool,
+    ) -> Result<Option<Cold>> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
         let wanted = beside::is_stepped(self.beside_cold, shown, has_sensors);
-        let scene = || self.scene.build(&self.build.build());
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
+        wanted
+            .then(|| self.scene.build(build).map(|scene| Cold::new(scene, parameters)))
+            .transpose()
     }
 }
 
@@ -235,8 +242,8 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     args.files.check()?;
     let outputs = args.files.named().chain(args.traced.named()).chain(args.faults.named());
     Files::of(common).write(outputs).check()?;
-    let build = args.build.build();
-    let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
+    let build = common.build();
+    let mut opened = board::open(common, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
     let parameters = args.parameters(opened.accelerator.capabilities());
     let mut scene = args.scene.build(&build)?;
@@ -248,7 +255,7 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let sensors = energy::sensors(is_emulated(&opened));
-    let cold = args.beside(&parameters, sensors.is_some())?;
+    let cold = args.beside(&build, &parameters, sensors.is_some())?;
     let mut course = Course { cold, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
     course.film = args.files.film(&scene, args.steps(), parameters.time_step)?;
@@ -276,27 +283,23 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
-/// Writes the files of the poses, and the picture.
+/// Writes the files of the poses.
 fn write_files(
     args: &RunArgs,
     opened: &OpenBoard,
     scene: &Scene,
     course: &mut Course,
 ) -> Result<Vec<Written>> {
-    let mut written = Vec::new();
-    if let Some(film) = &mut course.film {
-        film.end(course.done, scene)?;
-        let digest = digest::of_bodies(scene.bodies());
-        let facts = [
-            ("scene", args.scene.text()),
-            ("board", opened.accelerator.board().to_string()),
-            ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
-            ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
-        ];
-        written = args.files.write(film, &args.scene.text(), &facts)?;
-    }
-    written.extend(args.files.write_picture(scene)?);
-    Ok(written)
+    let Some(film) = &mut course.film else { return Ok(Vec::new()) };
+    film.end(course.done, scene)?;
+    let digest = digest::of_bodies(scene.bodies());
+    let facts = [
+        ("scene", args.scene.text()),
+        ("board", opened.accelerator.board().to_string()),
+        ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
+        ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
+    ];
+    args.files.write(film, &args.scene.text(), &facts)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.

@@ -10,7 +10,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use scene::Grid;
-use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
 use zynq_pgs::{Impulses, StepParameters};
 
@@ -194,7 +193,7 @@ impl Course<'_> {
 impl Measure for Options {
     /// Takes the step with each number of passes.
     fn measure(&self, session: &Session) -> Result<Part> {
-        let mut opened = board::open(&session.common, &Build::default())?.stated();
+        let mut opened = board::open(&session.common, session.common.build().config())?.stated();
         let (name, step) = match &self.input {
             Some(path) => (path.display().to_string(), Some(GivenStep::folder(path)?)),
             None => {
