@@ -42,7 +42,7 @@ def collisions():
 
 with zynq_pgs.Accelerator("emulated") as board:
     board.set_shapes([(0, 0, 0, 0), (1, *[2.5 / RADIUS**2] * 3)])  # inverse mass and inertia: the box, a ball of 1 kg
-    cycles = [board.step(bodies, collisions(), gravity=(0, -9.81, 0), spin_damping=0).cycles for _ in range(STEPS)]
+    cycles = [board.step(bodies, collisions(), gravity=(0, -9.81, 0)).cycles for _ in range(STEPS)]
     print(f"{STEPS} steps, the last one of {len(collisions())} collisions in {cycles[-1]:,} cycles")
 
 if len(sys.argv) > 1:

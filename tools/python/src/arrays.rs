@@ -68,7 +68,7 @@ impl<'py> Arrays<'py> {
             angular_velocities: of("angular_velocity", float, Some(3))?,
             shapes: read_only(of("shape", index, None)?),
             count: counts[0],
-            size: size_of::<BodyArrays>(),
+            ..BodyArrays::default()
         };
         if counts.iter().any(|count| *count != bodies.count) {
             let text = format!("bodies: found arrays of {counts:?} rows, expected one number");
