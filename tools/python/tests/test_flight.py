@@ -96,7 +96,9 @@ def test_other_threads_run_while_a_step_is_awaited_and_are_refused(board):
     other = threading.Thread(target=call)
     other.start()
     try:
-        while not seen:
+        for _ in range(1000):
+            if seen:
+                break
             try:
                 board.step(bodies, collisions, contact_iterations=60)
             except zynq_pgs.Error as error:
