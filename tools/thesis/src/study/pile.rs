@@ -81,7 +81,7 @@ impl Measure for Options {
         let mut figure = Figure::new(
             ("figure-4-1", "§4.3, Figure 4.1"),
             format!("A snapshot of the scene: {cubes} after {steps} steps"),
-            Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
+            Picture::of(&recording).svg().map_err(Failure::input)?,
             "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.",
         );
         figure.playback = Some(page(&recording, &title, &facts).map_err(Failure::input)?.html);

@@ -39,11 +39,12 @@ pub(crate) struct FileArgs {
         value_parser = |text: &str| with_extension(text, &["html"])
     )]
     view: Option<PathBuf>,
-    /// Write a picture of the last step.
+    /// Write a picture: .png of the last step, .apng of the whole run, which moves; a name for
+    /// pages that know only .png ends in .apng.png.
     #[arg(
         long,
-        value_name = "FILE.png",
-        value_parser = |text: &str| with_extension(text, &["png"])
+        value_name = "FILE.png|apng",
+        value_parser = |text: &str| with_extension(text, &["png", "apng"])
     )]
     picture: Option<PathBuf>,
     /// Record every K-th step [default: the smallest K that gives at most 200 frames]
@@ -61,6 +62,12 @@ pub(crate) struct FileArgs {
 
 fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or("")
+}
+
+/// Whether a picture of that name moves.
+fn is_moving(picture: &Path) -> bool {
+    let name = picture.to_string_lossy();
+    name.ends_with(".apng") || name.ends_with(".apng.png")
 }
 
 /// A path whose extension names a format that can be written.
@@ -105,24 +112,18 @@ impl FileArgs {
         self.given().map(|(name, path)| Named::option(name, path))
     }
 
-    /// Begins to record a scene at its start; `None` if no file shows its course.
+    /// Begins to record a scene at its start; `None` if no file shows it.
     pub(super) fn film(&self, scene: &Scene, steps: u32, time_step: f32) -> Result<Option<Film>> {
-        if self.poses.is_none() && self.view.is_none() {
-            return Ok(None);
+        if self.poses.is_none()
+            && self.view.is_none()
+            && self.picture.as_deref().is_none_or(|picture| !is_moving(picture))
+        {
+            // A still picture shows the end, with colours of the start.
+            let still = self.picture.is_some().then(|| Film::new(scene, steps, time_step));
+            return still.transpose();
         }
         let every = steps.div_ceil(self.frames.unwrap_or(FRAMES)).max(1);
         Film::new(scene, self.every.unwrap_or(every), time_step).map(Some)
-    }
-
-    /// Writes the picture of a scene.
-    pub(super) fn write_picture(&self, scene: &Scene) -> Result<Option<Written>> {
-        let Some(path) = &self.picture else { return Ok(None) };
-        let picture = Picture::of_all(scene.bodies(), scene.geometries());
-        let Picture { width, height, .. } = picture;
-        let bytes = picture.png().map_err(|error| Failure::new(Cause::Output, error))?;
-        let document = json!({ "width": width, "height": height });
-        Written::new("picture", path, &bytes, format!("{width} x {height} pixels"), document)
-            .map(Some)
     }
 
     /// Writes the files of a course; returns what was written.
@@ -155,6 +156,18 @@ impl FileArgs {
                 "largest_error_degrees": page.error.angle,
             });
             written.push(Written::new("view", path, page.html.as_bytes(), text, document)?);
+        }
+        if let Some(path) = &self.picture {
+            let (picture, moves) = match is_moving(path) {
+                true => (Picture::moving(recording), format!(", {frames} frames")),
+                false => (Picture::of(recording), String::new()),
+            };
+            let Picture { width, height, .. } = picture;
+            let bytes = if moves.is_empty() { picture.png() } else { picture.apng() };
+            let bytes = bytes.map_err(|error| Failure::new(Cause::Output, error))?;
+            let text = format!("{width} x {height} pixels{moves}");
+            let document = json!({ "width": width, "height": height });
+            written.push(Written::new("picture", path, &bytes, text, document)?);
         }
         Ok(written)
     }

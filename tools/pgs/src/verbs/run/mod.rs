@@ -57,6 +57,7 @@ Examples:
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
+  pgs run --scene shapes --picture pile.apng     a picture that moves
   pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
@@ -282,27 +283,23 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
-/// Writes the files of the poses, and the picture.
+/// Writes the files of the poses.
 fn write_files(
     args: &RunArgs,
     opened: &OpenBoard,
     scene: &Scene,
     course: &mut Course,
 ) -> Result<Vec<Written>> {
-    let mut written = Vec::new();
-    if let Some(film) = &mut course.film {
-        film.end(course.done, scene)?;
-        let digest = digest::of_bodies(scene.bodies());
-        let facts = [
-            ("scene", args.scene.text()),
-            ("board", opened.accelerator.board().to_string()),
-            ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
-            ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
-        ];
-        written = args.files.write(film, &args.scene.text(), &facts)?;
-    }
-    written.extend(args.files.write_picture(scene)?);
-    Ok(written)
+    let Some(film) = &mut course.film else { return Ok(Vec::new()) };
+    film.end(course.done, scene)?;
+    let digest = digest::of_bodies(scene.bodies());
+    let facts = [
+        ("scene", args.scene.text()),
+        ("board", opened.accelerator.board().to_string()),
+        ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
+        ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
+    ];
+    args.files.write(film, &args.scene.text(), &facts)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.
