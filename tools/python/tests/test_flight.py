@@ -121,6 +121,22 @@ def test_a_cancelled_step_changes_nothing_and_the_next_one_runs(board):
     assert bodies.tobytes() != before
 
 
+def test_a_cancellation_ends_both_steps_in_flight_and_each_wait_says_so(board):
+    board.set_shapes(SHAPES)
+    worlds = [pile(20, seed) for seed in (1, 2)]
+    before = [bodies.tobytes() for bodies, _ in worlds]
+    for world in worlds:
+        board.submit(*world)
+    board.cancel()
+    for _ in worlds:
+        with pytest.raises(zynq_pgs.Error) as cancelled:
+            board.wait()
+        assert cancelled.value.kind == "cancelled"
+    assert [bodies.tobytes() for bodies, _ in worlds] == before
+    board.step(*worlds[0])
+    assert worlds[0][0].tobytes() != before[0]
+
+
 def test_a_closed_accelerator_refuses_calls(board):
     board.set_shapes(SHAPES)
     bodies, collisions = pile(5)
