@@ -177,7 +177,7 @@ impl Measure for Options {
 impl Options {
     /// The state in which all boards start, with its collisions; none if Ctrl-C ended the fall.
     fn start(&self, session: &Session) -> Result<Option<(World, StepParameters)>> {
-        let parameters = StepParameters::default();
+        let parameters = StepParameters::thesis();
         session.expect(if self.input.is_some() { 4 } else { (FALL + 4 * STEPS).into() });
         let Some(path) = &self.input else {
             let (mut scene, mut opened) =
