@@ -102,8 +102,8 @@ fn a_wrong_verb_or_option_gets_a_suggestion() {
         ("solv x", "solve"),
         ("thesis determinsm", "determinism"),
         ("--stps 4", "--steps"),
-        ("run --bord emulated", "--board"),
-        ("serve --sockt x", "--socket"),
+        ("run --boards emulated", "--board"),
+        ("serve --sockets x", "--socket"),
     ] {
         let ran = run(words.split(' '));
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);
