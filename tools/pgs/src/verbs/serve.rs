@@ -72,7 +72,7 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.built.board.unwrap_or_default().config() };
-    let planned = args.planned.plan(&config, &StepParameters::default());
+    let planned = args.planned.plan(&config, &StepParameters::thesis());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let bytes = args.memory_mib << 20;
     if let Some(fence) = config.fence.filter(|fence| !fence.contains(MEMORY_BASE, bytes)) {

@@ -112,7 +112,7 @@ mod tests {
         let scene = Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).expect("a scene");
         let mut accelerator = Accelerator::open(OpenOptions::default()).expect("an emulated board");
         accelerator.set_shapes(scene.shapes()).expect("two shapes");
-        let mut cold = Cold::new(scene, &StepParameters::default());
+        let mut cold = Cold::new(scene, &StepParameters::thesis());
         assert!(!cold.has_taken(1) && cold.end_json(1).is_none());
         cold.step(1, &mut accelerator).expect("no fault").expect("no Ctrl-C");
         assert!(cold.has_taken(1) && cold.end_json(1).is_some());

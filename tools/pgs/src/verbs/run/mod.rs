@@ -161,7 +161,7 @@ impl RunArgs {
         let warm = self.warm_start.unwrap_or(shapes);
         let has_frictions = can.variant.has_pair_friction();
         let frictions = self.pair_friction.unwrap_or(shapes && has_frictions);
-        let parameters = StepParameters::default()
+        let parameters = StepParameters::thesis()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(warm)
