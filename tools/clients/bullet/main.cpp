@@ -84,6 +84,7 @@ const std::vector<Scene> &scenes() {
         {"properties", "a ball on the ground, its contact with a property that no board has", properties,
          false},
         {"masses", "more masses than the table of the board", masses, false},
+        {"worlds", "a heap of cubes and one of balls, two worlds on one board", worlds, false},
         {"warm", "1,000 jumbled cubes, a step with the last one's impulses and one without", warmth, false},
         {"spread", "pile and tower, the bodies shifted by at most 1 mm", spread, true},
         {"time", "a step of jumbled cubes, both solvers on the same contacts, 10 + 10 passes", timing, true},

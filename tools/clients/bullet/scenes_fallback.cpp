@@ -1,4 +1,4 @@
-// Steps that Bullet's own solver takes, and masses beyond the table of the board.
+// Steps that Bullet's own solver takes, masses beyond the table of the board, and worlds that share one.
 #include <iterator>
 
 #include "table.h"
@@ -54,7 +54,58 @@ std::vector<double> runRagdolls(World &world, bool withBoxes) {
     return {highest, double(counts.boardSteps), world.kineticEnergy()};
 }
 
+// A heap of 60 bodies; each kind has shapes of its own.
+void addHeap(World &world, int kind) {
+    world.addGround();
+    btCollisionShape *ball = world.shape<btSphereShape>(0.4f);
+    for (int i = 0; i < 60; i++) {
+        const btVector3 grid(float(i % 3) + 0.1f * float(i % 2), 1 + float(i / 9), float(i / 3 % 3));
+        world.add(kind ? ball : world.cube(), 1 + 2 * float(kind), 1.1f * grid);
+    }
+}
+
+void addPlaces(const World &world, std::vector<btVector3> &places) {
+    for (const auto &body : world.bodies()) places.push_back(place(body.get()));
+}
+
+// Two worlds on one board in turn, and each alone: how many of their bodies lie elsewhere, and the steps
+// of the board and its openings.
+std::vector<double> runWorlds(const Settings &settings, ZynqPgsOptions options, bool byPlace) {
+    options.byPlace = byPlace;
+    const int steps = 300, passes = 10;
+    std::vector<btVector3> shared, alone;
+    const auto board = std::make_shared<ZynqPgsBoard>(settings.board.c_str());
+    World cubes(board, options, passes), balls(board, options, passes);
+    addHeap(cubes, 0);
+    addHeap(balls, 1);
+    for (int i = 0; i < steps; i++) {
+        cubes.step();
+        balls.step();
+    }
+    for (World *world : {&cubes, &balls}) addPlaces(*world, shared);
+    for (const int kind : {0, 1}) {
+        World world(settings.board, options, passes);
+        addHeap(world, kind);
+        world.step(steps);
+        addPlaces(world, alone);
+    }
+    double elsewhere = 0;
+    for (size_t i = 0; i < shared.size(); i++) elsewhere += !(shared[i] == alone[i]);
+    const double taken = double(cubes.board()->counts().boardSteps + balls.board()->counts().boardSteps);
+    return {elsewhere, taken, double(board->openings)};
+}
+
 }  // namespace
+
+void worlds(Table &table) {
+    for (const bool byPlace : {false, true}) {
+        const auto found = runWorlds(table.settings(), table.settings().solver, byPlace);
+        const std::string way = byPlace ? "impulses by place: " : "impulses by value: ";
+        table.add(NONE, found[0], way + "bodies elsewhere than alone", "", within(0, 0));
+        table.add(NONE, found[1], way + "steps that the board took", "", atLeast(400));
+        table.add(NONE, found[2], way + "times that it was opened", "", within(1, 1));
+    }
+}
 
 void ragdolls(Table &table) {
     const auto alone = table.measure(10, [](World &world) { return runRagdolls(world, false); });

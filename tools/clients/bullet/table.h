@@ -87,6 +87,6 @@ void pile(Table &), wall(Table &), tower(Table &), ratio(Table &), spread(Table 
 void ramp(Table &), groove(Table &), spin(Table &);
 void platform(Table &), restitution(Table &), mesh(Table &), ccd(Table &);
 void basic(Table &), compound(Table &), pyramids(Table &), heightfield(Table &);
-void ragdolls(Table &), masses(Table &);
+void ragdolls(Table &), masses(Table &), worlds(Table &);
 void drop(Table &), deep(Table &), rolling(Table &), rollers(Table &), soft(Table &), properties(Table &);
 void warmth(Table &), timing(Table &);

@@ -87,14 +87,14 @@ mod tests {
         let (mut scene, mut opened) =
             open(grid, 0.2, &CommonArgs::emulated(), BoardConfig::default()).expect("a board");
         let mut by_hand = build(grid, 0.2).expect("a pile");
-        let given = StepParameters::default().with_order(Some(Order::AsGiven));
+        let given = StepParameters::thesis().with_order(Some(Order::AsGiven));
         for _ in 0..40 {
             by_hand.detect();
             let (bodies, collisions) = by_hand.parts_mut();
             opened.accelerator.step(bodies, collisions, &given).expect("a step");
         }
         by_hand.detect();
-        let defaults = StepParameters::default();
+        let defaults = StepParameters::thesis();
         assert!(step_to(&mut scene, &mut opened, &defaults, 40, || true).expect("steps"));
         assert_eq!(scene.bodies(), by_hand.bodies());
         assert_eq!(scene.collisions(), by_hand.collisions());

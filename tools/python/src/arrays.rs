@@ -30,8 +30,8 @@ pub(crate) fn collision(py: Python<'_>) -> PyResult<&Bound<'_, PyArrayDescr>> {
     let make = || {
         let contact = (("point", "<f4", 3), ("distance", "<f4")).into_pyobject(py)?.to_list();
         let contacts = ("contacts", contact, ZPGS_CONTACT_POINTS);
-        let bodies = (("body_a", "<u4"), ("body_b", "<u4"));
-        let list = (bodies.0, bodies.1, ("normal", "<f4", 3), ("count", "<u4"), contacts);
+        let (body_a, body_b) = (("body_a", "<u4"), ("body_b", "<u4"));
+        let list = (body_a, body_b, ("normal", "<f4", 3), ("count", "<u4"), contacts);
         PyArrayDescr::new(py, list.into_pyobject(py)?.to_list()).map(Bound::unbind)
     };
     Ok(ONCE.get_or_try_init(py, make)?.bind(py))
@@ -68,7 +68,7 @@ impl<'py> Arrays<'py> {
             angular_velocities: of("angular_velocity", float, Some(3))?,
             shapes: read_only(of("shape", index, None)?),
             count: counts[0],
-            size: size_of::<BodyArrays>(),
+            ..BodyArrays::default()
         };
         if counts.iter().any(|count| *count != bodies.count) {
             let text = format!("bodies: found arrays of {counts:?} rows, expected one number");

@@ -6,6 +6,7 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs, Given};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::options::build::ThreadsArgs;
+use pgs_command::output::width::terminal;
 use serde_json::json;
 
 use crate::experiment::{Boards, Experiment, SCHEMA};
@@ -178,7 +179,7 @@ fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
             });
             writeln!(out, "{document:#}")?;
         }
-        false => write!(out, "{}", table.to_text(usize::MAX))?,
+        false => write!(out, "{}", table.to_text(usize::MAX, terminal()))?,
     }
     Ok(Verdict::Done)
 }

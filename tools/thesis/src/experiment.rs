@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::facts::fact;
-use pgs_command::output::width::stdout_width;
+use pgs_command::output::width::{stdout_width, terminal};
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
@@ -176,7 +176,7 @@ impl Part {
             fact(out, label, text)?;
         }
         for table in self.tables.iter().chain(&self.index()) {
-            write!(out, "\n{}", table.to_text(stdout_width()))?;
+            write!(out, "\n{}", table.to_text(stdout_width(), terminal()))?;
         }
         if !self.complete && self.agrees {
             writeln!(out, "{INTERRUPTED}")?;

@@ -25,7 +25,7 @@ fn step(
     accelerator.set_shapes(scene.shapes()).expect("shapes");
     scene.detect();
     let (bodies, collisions) = scene.parts_mut();
-    let parameters = StepParameters::default().with_order(Some(Order::AsGiven));
+    let parameters = StepParameters::thesis().with_order(Some(Order::AsGiven));
     let report = accelerator.step(bodies, collisions, &parameters).expect("a step");
     let shape = StepShape {
         contact_iterations: parameters.contact_iterations.into(),

@@ -28,7 +28,7 @@ a device file of the logic, a u-dma-buf or /dev/mem open or locked. Without --re
 refuses while another overlay is applied or a driver is bound to the logic. Remove the overlay by
 rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 
-/// Load a bitstream into the board through the kernel's FPGA manager.
+/// Load a bitstream through the kernel's FPGA manager
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {

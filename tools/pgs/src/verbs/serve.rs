@@ -17,8 +17,8 @@ use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::{BuiltArgs, described};
 use pgs_command::options::planned::PlannedArgs;
-use pgs_command::output::SCHEMA;
 use pgs_command::output::files::{Files, Named};
+use pgs_command::output::{REFUSED, SCHEMA};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -34,7 +34,7 @@ One driver at a time has the board, with new memory of its own; a connection tha
 5 s is closed. A killed driver leaves the engines running, and the next driver resets them. Ctrl-C
 ends the server and removes the socket.";
 
-/// Serve an emulated board to drivers in other processes, at a Unix socket.
+/// Serve an emulated board to other processes, at a Unix socket
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
     let mut config = BoardConfig { strict: false, ..args.built.board.unwrap_or_default().config() };
-    let planned = args.planned.plan(&config, &StepParameters::default());
+    let planned = args.planned.plan(&config, &StepParameters::thesis());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let bytes = args.memory_mib << 20;
     if let Some(fence) = config.fence.filter(|fence| !fence.contains(MEMORY_BASE, bytes)) {
@@ -182,7 +182,7 @@ fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
     write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;
     match ended {
         Ended::Left => write!(out, "left")?,
-        Ended::Refused(error) => write!(out, "refused: {error}")?,
+        Ended::Refused(error) => write!(out, "{REFUSED}refused{REFUSED:#}: {error}")?,
         Ended::Broken(error) => write!(out, "broken off: {error}")?,
         _ => write!(out, "gone")?,
     }

@@ -285,6 +285,7 @@ fn serve(example: &Example, clients: &[&Example]) {
 fn every_printed_command_runs_in_a_clone_or_names_its_need() {
     let helps = helps();
     let mut examples: Vec<_> = helps.iter().flat_map(|(verb, help)| of_help(verb, help)).collect();
+    examples.extend(of_help(&[], &run(["-h"]).stdout));
     let in_help = examples.len();
     let mut pages = documents();
     pages.push("device-tree/README.md".to_owned());

@@ -30,8 +30,8 @@ fn a_run_writes_the_files_that_it_names() {
         text(&view),
         "--picture",
         text(&picture),
-        "--every",
-        "3",
+        "--fps",
+        "20",
     ];
     let document = ran(&[&files[..], &["--json"]].concat()).json();
     // The start, steps 3 and 6, and the last one.
@@ -61,7 +61,7 @@ fn the_name_of_a_file_tells_its_format() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let begins = |option: &str, name: &str| {
         let path = folder.path().join(name);
-        ran(&[option, text(&path), "--frames", "2"]);
+        ran(&[option, text(&path), "--fps", "10"]);
         String::from_utf8_lossy(&fs::read(&path).expect("a file")[..20]).into_owned()
     };
     assert!(begins("--poses", "a.npz").starts_with("PK\u{3}\u{4}"));

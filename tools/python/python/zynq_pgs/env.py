@@ -67,7 +67,7 @@ class PushBalls(VectorEnv):
         force = FORCE * np.clip(np.asarray(actions, np.float32).reshape(self.num_envs, 2), -1, 1)
         before = self._way()
         self._state["linear_velocity"][:, 0, ::2] += force / 60
-        report = self.board.step(self.bodies, self._collisions(), order="as-given", time_step=1 / 60, spin_damping=0)
+        report = self.board.step(self.bodies, self._collisions(), order="as-given", time_step=1 / 60)
         self._steps += 1
         way = self._way()
         reward, terminated = before - way, way < GOAL

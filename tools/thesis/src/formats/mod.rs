@@ -113,7 +113,7 @@ fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>> {
     let mut opened = board::open(&session.common, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;
     let scene = args.scene.build(&build)?;
-    let parameters = args.deadline.apply(StepParameters::default());
+    let parameters = args.deadline.apply(StepParameters::thesis());
     let before = args.step.saturating_sub(1);
     let step = GivenStep::after(before, scene, &mut opened, parameters, session);
     session.end();

@@ -163,7 +163,7 @@ impl Measure for OrderArgs {
                 let OrderArgs { grid, drop, steps, .. } = *self;
                 let (scene, mut opened) =
                     pile::open(grid, drop, &session.common, session.common.build().config())?;
-                let parameters = StepParameters::default();
+                let parameters = StepParameters::thesis();
                 let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
                 (format!("{grid} cubes dropped from {drop} m, step {}", steps + 1), step, None)
             }

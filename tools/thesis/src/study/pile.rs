@@ -51,7 +51,7 @@ impl Measure for Options {
         session.watch(&mut opened);
         // As `pgs run`, whose defaults the printed command takes.
         let [steps, _] = STEPS;
-        let parameters = StepParameters::default()
+        let parameters = StepParameters::thesis()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS);
         let mut recording = Recording::new(scene.bodies(), scene.geometries());

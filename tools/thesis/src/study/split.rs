@@ -108,7 +108,7 @@ impl Measure for Options {
         let (mut scene, mut opened) = pile::open(grid, drop, &session.common, config)?;
         scene.set_threads(1);
         session.watch(&mut opened);
-        let parameters = StepParameters::default();
+        let parameters = StepParameters::thesis();
         session.expect(u64::from(self.steps) + u64::from(self.runs));
         let mut samples = Vec::new();
         let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, self.steps, || {

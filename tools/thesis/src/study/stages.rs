@@ -47,7 +47,7 @@ fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u
         }
         scene.detect();
         let (bodies, collisions) = scene.parts_mut();
-        let stepped = opened.accelerator.step(bodies, collisions, &StepParameters::default());
+        let stepped = opened.accelerator.step(bodies, collisions, &StepParameters::thesis());
         report = Some(stepped.map_err(|error| opened.failure(error))?);
     }
     let recording = observer.take_recording();
@@ -86,7 +86,7 @@ fn measure(common: &CommonArgs) -> Result<Part> {
             format!("{} cycles on the emulated board", grouped(cycles)),
         );
         let StepParameters { contact_iterations, friction_iterations, .. } =
-            StepParameters::default();
+            StepParameters::thesis();
         row.command = format!(
             "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations \
              {contact_iterations} \

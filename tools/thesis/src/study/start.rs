@@ -123,7 +123,7 @@ impl<'a> Start<'a> {
             None => {
                 let scene = Box::new(args.scene.build(&Build::default())?);
                 let steps = args.steps.unwrap_or(STEPS);
-                (World::Scene(scene), None, StepParameters::default(), steps)
+                (World::Scene(scene), None, StepParameters::thesis(), steps)
             }
         };
         let parameters = args.deadline.apply(args.solver.apply(own));

@@ -150,7 +150,7 @@ pub(super) enum Start {
 impl Start {
     fn parameters(self) -> StepParameters {
         let warm = self == Self::Warm;
-        StepParameters::default().with_warm_start(warm).with_impulses_out(warm)
+        StepParameters::thesis().with_warm_start(warm).with_impulses_out(warm)
     }
 }
 

@@ -26,7 +26,6 @@ use self::film::Film;
 use self::row::{Row, columns, step};
 use self::summary::Totals;
 use crate::bug_report::FaultArgs;
-use crate::footprint::Footprint;
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
@@ -46,6 +45,7 @@ use pgs_command::output::milliseconds;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
 use pgs_command::output::table::{Fixed, heading, line};
+use pgs_command::output::width::terminal;
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -65,7 +65,7 @@ Examples:
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
   pgs run --scene shapes --picture pile.apng     a picture that moves
   pgs run --live 8000                            a page that plays while the board steps
-  pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
+  pgs run --poses pile.npz --fps 15              fifteen poses of a second, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -76,7 +76,10 @@ Columns: step; pairs of bodies in contact; deepest penetration in the contacts g
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
 step on the board, modelled for an emulated board; time of this machine. With --beside-cold the \
 depth
-and the energy of the same scene without a warm start and with one friction, stepped beside it.";
+and the energy of the same scene without a warm start and with one friction, stepped beside it.
+
+Ratio: the time of the same steps in software on a ZCU102's four Cortex-A53 cores, divided by
+that of board and driver; on paper, without the search for collisions (docs/worth.md).";
 
 /// The end of the short help.
 const MORE: &str = "`pgs run --help` has all options, by subject, and examples.";
@@ -88,12 +91,12 @@ const ROWS: u32 = 15;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = MORE, after_long_help = EXAMPLES)]
 pub(crate) struct RunArgs {
-    /// Steps to take [default: 120 for cubes, 600 for shapes]
+    /// Steps to take [default: 120 cubes, 600 shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Show every N-th step [default: a fifteenth of the steps]
+    /// Show every N-th step [default: a fifteenth of all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
     #[command(flatten)]
@@ -103,6 +106,7 @@ pub(crate) struct RunArgs {
     /// With 0.85 of them, in one more pass of each kind [default: on for --scene shapes]
     #[arg(
         long,
+        hide_possible_values = true,
         value_name = "BOOL",
         help_heading = "Solver",
         num_args = 0..=1,
@@ -164,7 +168,7 @@ impl RunArgs {
         let warm = self.warm_start.unwrap_or(shapes);
         let has_frictions = can.variant.has_pair_friction();
         let frictions = self.pair_friction.unwrap_or(shapes && has_frictions);
-        let parameters = StepParameters::default()
+        let parameters = StepParameters::thesis()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(warm)
@@ -221,8 +225,6 @@ struct Course {
     done: u32,
     retries: u64,
     totals: Totals,
-    footprint: Footprint,
-    orders: order::OrdersSent,
     /// With `--json`, the document of every step.
     documents: Vec<Value>,
     last: Option<Row>,
@@ -286,7 +288,7 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
         let note = format!("{} steps, {mean} on average", course.done);
         live.end((course.done, time), &note, scene.bodies());
     }
-    course.energy = energy::end(meter, course.done, course.totals.mean());
+    course.energy = energy::end(meter, course.done);
     let complete = course.is_complete(args.steps());
     let written = write_files(args, &opened, &parameters, &scene, &mut course)?;
     if common.json {
@@ -296,11 +298,12 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
         }
         writeln!(out, "{document:#}")?;
     } else {
-        print_end(args, &parameters, &opened, &mut scene, &mut course, out)?;
+        writeln!(out)?;
         for file in written {
             fact(out, file.label, &file.text)?;
         }
         args.traced.print(course.inside, out)?;
+        print_end(args, &opened, &mut scene, &course, out)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
@@ -362,7 +365,6 @@ fn take_steps(
     out: &mut dyn Write,
 ) -> Result<()> {
     let progress = progress_bar(args.steps());
-    let variant = opened.accelerator.capabilities().variant;
     let mut warm = parameters.warm_start.then(WarmStart::default);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
@@ -402,8 +404,6 @@ fn take_steps(
         }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
-        course.footprint.include(&variant, &row.report);
-        course.orders.count(row.report.order);
         if course.done == 1 && !common.json {
             // The heading waits for the first step: a refused scene prints only the refusal.
             let cold = course.cold.is_some();
@@ -428,10 +428,15 @@ fn take_steps(
     Ok(())
 }
 
-/// The columns of the default table.
+/// The columns of the default table, as many as fit the terminal.
 fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
-    let own = columns(is_emulated(opened));
-    own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold)).collect()
+    let (own, mut used) = (columns(is_emulated(opened)), 0);
+    let all = own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold));
+    let fits = |column: &Fixed| {
+        used += column.width + 1;
+        used <= terminal().saturating_add(1)
+    };
+    all.take_while(fits).collect()
 }
 
 /// Whether the times of the board are modelled.

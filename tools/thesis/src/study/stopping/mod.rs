@@ -199,7 +199,7 @@ impl Measure for Options {
             None => {
                 let Options { grid, drop, steps, .. } = *self;
                 scenes::check_size(grid, opened.accelerator.capabilities())?;
-                let (scene, parameters) = (pile::build(grid, drop)?, StepParameters::default());
+                let (scene, parameters) = (pile::build(grid, drop)?, StepParameters::thesis());
                 let parameters = self.solver.apply(parameters);
                 let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
                 (format!("step {} of {grid} cubes dropped from {drop} m", steps + 1), step)

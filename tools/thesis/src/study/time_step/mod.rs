@@ -127,7 +127,7 @@ impl Measure for Options {
         let mut rows: Vec<Row> = Vec::new();
         let mut shortest = None;
         for rate in RATES {
-            let parameters = StepParameters::default()
+            let parameters = StepParameters::thesis()
                 .with_contact_iterations(self.iterations)
                 .with_friction_iterations(self.iterations)
                 .with_time_step(1.0 / f32::from(rate));
