@@ -30,7 +30,7 @@ JOINTED = -1
 class BoardSolver:
     """Steps a model: MuJoCo detects, the board solves the contacts of free bodies, MuJoCo solves everything else.
 
-    A body goes to the board if its one joint is free, no body hangs on it and no equality constrains it. Bodies that
+    A body goes to the board if its one joint is free, no body hangs on it and no equality or tendon holds it. Bodies that
     touch, directly or through others, a body that MuJoCo keeps stay with MuJoCo for that step. Each pair has the
     friction of its contacts; friction against rolling and torsion is left out.
     """
@@ -42,11 +42,14 @@ class BoardSolver:
         bodies = np.arange(model.nbody)
         free = (model.body_jntnum == 1) & (model.body_parentid == 0) & ~np.isin(bodies, model.body_parentid[1:])
         free[free] = model.jnt_type[model.body_jntadr[free]] == mujoco.mjtJoint.mjJNT_FREE
-        for kind, one, other in zip(model.eq_objtype, model.eq_obj1id, model.eq_obj2id):
-            # A site or a joint stands for its body.
-            body = {mujoco.mjtObj.mjOBJ_SITE: model.site_bodyid, mujoco.mjtObj.mjOBJ_JOINT: model.jnt_bodyid}
-            of = body.get(mujoco.mjtObj(kind), bodies)
-            free[[of[index] for index in (one, other) if index >= 0]] = False
+        # Equalities and tendons name bodies, or sites, joints and geometries of bodies.
+        kinds, wraps = mujoco.mjtObj, mujoco.mjtWrap
+        named = {kinds.mjOBJ_BODY: bodies, kinds.mjOBJ_SITE: model.site_bodyid, kinds.mjOBJ_JOINT: model.jnt_bodyid,
+                 wraps.mjWRAP_SITE: model.site_bodyid, wraps.mjWRAP_JOINT: model.jnt_bodyid,
+                 wraps.mjWRAP_SPHERE: model.geom_bodyid, wraps.mjWRAP_CYLINDER: model.geom_bodyid}
+        ends = [(kinds(kind), end) for kind, *pair in zip(model.eq_objtype, model.eq_obj1id, model.eq_obj2id) for end in pair]
+        ends += [(wraps(kind), end) for kind, end in zip(model.wrap_type, model.wrap_objid)]
+        free[[named[kind][end] for kind, end in ends if kind in named and end >= 0]] = False
         self.free = np.flatnonzero(free)
         self.dofs = model.body_dofadr[self.free, None] + np.arange(6)
         # The number of each body on the board: 0 is everything that is fixed to the world.
@@ -94,7 +97,8 @@ class BoardSolver:
     def _collisions(self, data):
         """The collisions of the board, and which of its bodies MuJoCo keeps in this step."""
         contacts = [contact for contact in data.contact[: data.ncon] if contact.exclude == 0]
-        pairs = [self.place[self.model.geom_bodyid[contact.geom]] for contact in contacts]
+        # A flexible body has no geometry, and stays with MuJoCo.
+        pairs = [np.where(contact.geom < 0, JOINTED, self.place[self.model.geom_bodyid[contact.geom]]) for contact in contacts]
         left = self._touching(pairs)
         groups = {}
         for contact, (body_b, body_a) in zip(contacts, pairs):

@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ColorChoice};
 use zynq_pgs::BoardChoice;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::error::BoardTextError;
@@ -19,6 +19,18 @@ pub struct CommonOptions {
     /// Print one JSON document instead of text.
     #[arg(long, global = true)]
     pub json: bool,
+    /// Colours: auto, always, never
+    ///
+    /// With auto a terminal has them, unless `NO_COLOR` is set.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
+    pub color: ColorChoice,
 }
 
 /// The heading of the options of a board.

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 
+use anstream::ColorChoice;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
 
@@ -33,7 +34,14 @@ Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadabl
 usable board, or no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// The end of the short help.
-const MORE: &str = "`pgs --help` has all options and examples, `pgs VERB --help` those of a verb.";
+const MORE: &str = "\
+Examples:
+  pgs                                  drop 38,880 cubes
+  pgs --scene shapes --view pile.html  a pile and its page
+  pgs check --board emulated           test a board
+
+Without a verb `pgs` runs `run`. `pgs VERB -h` has a verb's
+options, `pgs VERB --help` all of them, with examples.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
 ///
@@ -49,14 +57,15 @@ struct Cli {
     run: RunArgs,
 }
 
-/// Options of `run`, also without the verb, that `-h` shows, in two screens; `--help` shows all.
-const SHORT: [&str; 15] = [
+/// Options that `pgs run -h` shows, in two screens; `pgs run --help` shows all.
+const SHORT: [&str; 16] = [
     "steps",
     "scene",
     "grid",
     "drop",
     "report_every",
     "json",
+    "color",
     "contact_iterations",
     "friction_iterations",
     "warm_start",
@@ -74,7 +83,24 @@ pub(crate) fn definition() -> clap::Command {
         let hidden = !SHORT.contains(&argument.get_id().as_str());
         argument.hide_short_help(hidden)
     };
-    Cli::command().mut_args(short).mut_subcommand("run", |run| run.mut_args(short))
+    // They stand in the help of the verb.
+    let of_run = |argument: clap::Arg| match argument.is_global_set() {
+        true => argument,
+        false => argument.hide_short_help(true).hide_long_help(true),
+    };
+    Cli::command().mut_args(of_run).mut_subcommand("run", |run| run.mut_args(short))
+}
+
+/// The colours that the command line asks for: also for the words of the parser and of the log.
+pub(crate) fn color(arguments: &[OsString]) -> ColorChoice {
+    let mut words = arguments.iter().filter_map(|word| word.to_str());
+    let value = words.find_map(|word| word.strip_prefix("--color"));
+    let value = value.and_then(|value| value.strip_prefix('=').or_else(|| words.next()));
+    match value {
+        Some("always") => ColorChoice::Always,
+        Some("never") => ColorChoice::Never,
+        _ => ColorChoice::Auto,
+    }
 }
 
 /// A parsed command line.
@@ -87,15 +113,19 @@ pub(crate) struct Command {
 /// Parses the command line, and reads options that it leaves out from `variable`. A request for
 /// help is an error, too.
 pub(crate) fn parse(
-    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    arguments: &[OsString],
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<Command, clap::Error> {
-    let mut command = definition();
+    let mut command = definition().color(match color(arguments) {
+        ColorChoice::Always | ColorChoice::AlwaysAnsi => clap::ColorChoice::Always,
+        ColorChoice::Never => clap::ColorChoice::Never,
+        ColorChoice::Auto => clap::ColorChoice::Auto,
+    });
     let matches = command.try_get_matches_from_mut(arguments)?;
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options are accepted here as well; before another verb they would have no effect.
         let stray = matches.ids().find(|id| {
-            let common = id.as_str() == "json";
+            let common = ["json", "color"].contains(&id.as_str());
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
@@ -132,8 +162,12 @@ mod tests {
         matches!(board, BoardChoice::Uio { node } if node == name)
     }
 
+    fn words(line: &str) -> Vec<OsString> {
+        line.split_whitespace().map(OsString::from).collect()
+    }
+
     fn parsed(line: &str) -> Result<Command, ErrorKind> {
-        parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
+        parse(&words(line), |_| None).map_err(|error| error.kind())
     }
 
     /// Parses with `PGS_BOARD` and `PGS_MEMORY` set; or the error message.
@@ -143,7 +177,7 @@ mod tests {
             MEMORY => Some(memory.into()),
             _ => None,
         };
-        let command = parse(line.split_whitespace(), variable);
+        let command = parse(&words(line), variable);
         command.map(|command| command.common).map_err(|error| error.to_string())
     }
 
@@ -190,12 +224,26 @@ mod tests {
             "pgs --board emulated",
             "pgs solve x --memory uio --board uio",
             "pgs thesis",
-            "pgs thesis step",
+            "pgs thesis cycles",
             "pgs load x",
             "pgs thesis detection --input x",
         ] {
             parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
         }
+    }
+
+    #[test]
+    fn colours_are_asked_for_wherever_the_option_stands() {
+        for (line, expected) in [
+            ("pgs", ColorChoice::Auto),
+            ("pgs --color never", ColorChoice::Never),
+            ("pgs check --color=always", ColorChoice::Always),
+            ("pgs --color auto --color=always", ColorChoice::Auto),
+        ] {
+            assert_eq!(color(&words(line)), expected, "{line}");
+        }
+        parsed("pgs check --color=always").expect("a colour");
+        parsed("pgs --color red").expect_err("no colour");
     }
 
     #[test]
@@ -244,7 +292,8 @@ mod tests {
 
     #[test]
     fn the_help_warns_of_logic_that_nobody_asks_about() {
-        let help = definition().render_long_help().to_string();
+        let mut pgs = definition();
+        let help = pgs.find_subcommand_mut("run").expect("a verb").render_long_help().to_string();
         let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(words.contains("WARNING") && words.contains("hangs the processor"), "{words}");
     }
@@ -268,7 +317,7 @@ mod tests {
             parsed(&format!("pgs {verb} --board uio")).expect_err(verb);
             parsed(&format!("pgs {verb} --accelerator rtl:x")).expect(verb);
         }
-        for verb in ["thesis step", "thesis ladder", "thesis detection --input x", "load x"] {
+        for verb in ["thesis cycles", "thesis ladder", "thesis detection --input x", "load x"] {
             for option in ["--board uio", "--memory uio", "--accelerator model"] {
                 let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
                 assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
@@ -276,7 +325,7 @@ mod tests {
         }
         let real = parsed_in("uio", "uio:m", "pgs thesis formats").expect("a board");
         assert!(is_uio(&real.board, UIO_NODE));
-        for line in ["pgs faults", "pgs thesis half", "pgs thesis step", "pgs serve --socket x"] {
+        for line in ["pgs faults", "pgs thesis half", "pgs thesis cycles", "pgs serve --socket x"] {
             let own = parsed_in("uio", "uio:m", line).expect(line).board;
             assert!(matches!(own, BoardChoice::Automatic), "{line}");
         }
@@ -311,8 +360,8 @@ mod tests {
             "pgs --manager fpga",
             "pgs --board served",
             "pgs serve",
-            "pgs thesis step --collisions -1 --bodies 1",
-            "pgs thesis step --collisions 1",
+            "pgs thesis cycles --collisions -1 --bodies 1",
+            "pgs thesis cycles --collisions 1",
             "pgs solve",
             "pgs frobnicate",
         ] {

@@ -29,8 +29,8 @@ pub(crate) fn data(array: &Bound<'_, PyUntypedArray>) -> *mut c_void {
 /// The structures of a call.
 ///
 /// Invariant: it is a part of `Arrays`, which keeps its arrays alive, so that every address leads
-/// to all elements of its array. Threads of Python must not write the arrays during a call, as during
-/// numpy's own functions.
+/// to all elements of its array. Threads of Python must not write the arrays during a call, as
+/// during numpy's own functions.
 pub(crate) struct Call {
     pub(crate) bodies: BodyArrays,
     /// `None` for a call that ends a step.
@@ -80,7 +80,7 @@ impl Handle {
     }
 
     /// The failure of a call that has just ended, if it is one. No other thread has begun a call
-    /// since, but for `cancel`, which has no text.
+    /// since, but for `cancel`, whose text is the thread's.
     fn check(&self, status: Status) -> Result<(), Failure> {
         match status {
             Status::Ok => Ok(()),
@@ -92,11 +92,7 @@ impl Handle {
 
     pub(crate) fn cancel(&self) -> Result<(), Failure> {
         // SAFETY: open as long as `self`.
-        let status = unsafe { zpgs_cancel(self.0.as_ptr()) };
-        match status {
-            Status::Ok => Ok(()),
-            _ => Err(Failure { status, text: text(ptr::null()) }),
-        }
+        self.check(unsafe { zpgs_cancel(self.0.as_ptr()) })
     }
 
     pub(crate) fn set_shapes(&self, shapes: &[Shape]) -> Result<(), Failure> {

@@ -5,6 +5,7 @@ import re
 import runpy
 
 import zynq_pgs
+from conftest import pile
 
 PACKAGE = pathlib.Path(__file__).parents[1]
 
@@ -13,11 +14,19 @@ def blocks(page):
     return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
 
 
-def test_the_example_of_the_readme_runs():
+def test_the_example_of_the_packages_readme_runs():
     (example,) = blocks(PACKAGE / "README.md")
     names = {}
     exec(example, names)
     assert abs(names["bodies"]["position"][1, 1] - 0.99) < 0.01
+
+
+def test_the_lines_of_the_projects_readme_run():
+    (lines,) = blocks(PACKAGE.parents[1] / "README.md")
+    bodies, collisions = pile(5)
+    before = bodies.tobytes()
+    exec(lines.replace("auto", "emulated"), {"zynq_pgs": zynq_pgs, "bodies": bodies, "found": collisions})
+    assert bodies.tobytes() != before
 
 
 def test_the_page_about_engines_shows_lines_of_the_example():

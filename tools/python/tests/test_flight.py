@@ -96,7 +96,9 @@ def test_other_threads_run_while_a_step_is_awaited_and_are_refused(board):
     other = threading.Thread(target=call)
     other.start()
     try:
-        while not seen:
+        for _ in range(1000):
+            if seen:
+                break
             try:
                 board.step(bodies, collisions, contact_iterations=60)
             except zynq_pgs.Error as error:
@@ -117,6 +119,22 @@ def test_a_cancelled_step_changes_nothing_and_the_next_one_runs(board):
     assert cancelled.value.kind == "cancelled" and bodies.tobytes() == before
     board.step(bodies, collisions)
     assert bodies.tobytes() != before
+
+
+def test_a_cancellation_ends_both_steps_in_flight_and_each_wait_says_so(board):
+    board.set_shapes(SHAPES)
+    worlds = [pile(20, seed) for seed in (1, 2)]
+    before = [bodies.tobytes() for bodies, _ in worlds]
+    for world in worlds:
+        board.submit(*world)
+    board.cancel()
+    for _ in worlds:
+        with pytest.raises(zynq_pgs.Error) as cancelled:
+            board.wait()
+        assert cancelled.value.kind == "cancelled"
+    assert [bodies.tobytes() for bodies, _ in worlds] == before
+    board.step(*worlds[0])
+    assert worlds[0][0].tobytes() != before[0]
 
 
 def test_a_closed_accelerator_refuses_calls(board):

@@ -79,11 +79,13 @@ def test_a_centre_of_mass_off_the_frame_and_forces_are_those_of_mujoco(client):
     assert np.allclose(board.qpos, own.qpos, atol=1e-3) and np.allclose(board.qvel, own.qvel, atol=2e-3)
 
 
-def test_a_body_of_an_equality_or_with_another_on_it_is_mujocos(client):
+def test_a_body_of_an_equality_or_a_tendon_or_with_another_on_it_is_mujocos(client):
     ball = '<body pos="0 0 0.5"><joint axis="1 0 0"/><geom type="sphere" size="0.1"/></body>'
+    more = {"a": "", "b": "", "c": ball, "d": "", "e": '<site name="e"/>', "f": '<site name="f"/>'}
+    bodies = "".join(f'<body name="{name}" pos="{place} 0 5"><freejoint/><geom size="0.1"/>{inside}</body>'
+                     for place, (name, inside) in enumerate(more.items()))
     model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><body name="a" pos="0 0 5"><freejoint/><geom size="0.1"/></body>'
-        '<body name="b" pos="1 0 5"><freejoint/><geom size="0.1"/></body>'
-        f'<body pos="2 0 5"><freejoint/><geom size="0.1"/>{ball}</body><body pos="4 0 5"><freejoint/><geom size="0.1"/></body>'
-        '</worldbody><equality><connect body1="a" body2="b" anchor="0.5 0 0"/></equality></mujoco>')
-    assert list(client.BoardSolver(model).free) == [5]
+        f'<mujoco><worldbody>{bodies}</worldbody>'
+        '<equality><connect body1="a" body2="b" anchor="0.5 0 0"/></equality>'
+        '<tendon><spatial limited="true" range="0 1"><site site="e"/><site site="f"/></spatial></tendon></mujoco>')
+    assert [model.body(body).name for body in client.BoardSolver(model).free] == ["d"]

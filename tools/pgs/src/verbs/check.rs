@@ -6,6 +6,7 @@ use bitstream_model::interface::fence::Fence;
 use bitstream_model::{
     BoardConfig, Coherency, Direction, InterruptWiring, Master, Quirks, Resettable,
 };
+use clap::builder::styling::Style;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use zynq_pgs::board::BoardKind;
@@ -16,9 +17,8 @@ use zynq_pgs::{CheckReport, check};
 use pgs_command::board::{self, ChosenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
-use pgs_command::output::SCHEMA;
-use pgs_command::output::facts::labelled;
-use pgs_command::output::width::of_terminal;
+use pgs_command::output::facts::whole;
+use pgs_command::output::{BAD, GOOD, REFUSED, SCHEMA};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -33,8 +33,7 @@ Examples on a board:
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, queue, fence;
-/// a failure names the next step.
+/// Test a board line by line; a failure names the next step
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
@@ -155,25 +154,28 @@ fn line_json(line: &CheckLine) -> Value {
 
 fn print(report: &CheckReport, out: &mut dyn Write) -> std::io::Result<()> {
     let (mut failed, mut skipped) = (0, 0);
-    // A file or a pipe gets whole lines, which programs can search.
-    let columns = of_terminal(std::io::stdout()).unwrap_or(usize::MAX);
-    let mut line = |begin: &str, name: &str, text: &str| {
-        labelled(out, &format!("{begin:<6}{name}"), 25, text, columns)
+    let mut line = |style: Style, begin: &str, name: &str, text: &str| {
+        whole(
+            out,
+            &format!("{style}{begin}{style:#}{:1$}{name:<19}", "", 6 - begin.len()),
+            25,
+            text,
+        )
     };
     for CheckLine { name, outcome, .. } in &report.lines {
         match outcome {
-            Outcome::Ok { detail } => line("ok", name, detail)?,
+            Outcome::Ok { detail } => line(GOOD, "ok", name, detail)?,
             Outcome::Failed { found, expected, next } => {
                 failed += 1;
-                line("FAIL", name, &format!("found {found}"))?;
-                line("", "", &format!("expected {expected}"))?;
-                line("", "", &format!("next: {next}"))?;
+                line(BAD, "FAIL", name, &format!("found {found}"))?;
+                line(BAD, "", "", &format!("expected {expected}"))?;
+                line(BAD, "", "", &format!("next: {next}"))?;
             }
             Outcome::Skipped { reason } => {
                 skipped += 1;
-                line("skip", name, reason)?;
+                line(REFUSED, "skip", name, reason)?;
             }
-            _ => line("?", name, "")?,
+            _ => line(REFUSED, "?", name, "")?,
         }
     }
     let passed = report.lines.len() - failed - skipped;

@@ -73,7 +73,7 @@ fn a_list_of_cells_for_programs_is_a_document_with_the_lines_for_people() {
         })
         .map(|(name, cell)| {
             assert!(cell["kind"].is_string() && cell["phase"].is_string(), "{cell}");
-            format!("{:12} {}", name.as_str().expect("text"), cell["fault"].as_str().expect("text"))
+            format!("{} {}", name.as_str().expect("text"), cell["fault"].as_str().expect("text"))
         })
         .collect();
     let text = String::from_utf8(list(&[]).stdout).expect("text");

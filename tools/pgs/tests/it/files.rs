@@ -30,8 +30,8 @@ fn a_run_writes_the_files_that_it_names() {
         text(&view),
         "--picture",
         text(&picture),
-        "--every",
-        "3",
+        "--fps",
+        "20",
     ];
     let document = ran(&[&files[..], &["--json"]].concat()).json();
     // The start, steps 3 and 6, and the last one.
@@ -61,11 +61,10 @@ fn the_name_of_a_file_tells_its_format() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let begins = |option: &str, name: &str| {
         let path = folder.path().join(name);
-        ran(&[option, text(&path), "--frames", "2"]);
+        ran(&[option, text(&path), "--fps", "10"]);
         String::from_utf8_lossy(&fs::read(&path).expect("a file")[..20]).into_owned()
     };
     assert!(begins("--poses", "a.npz").starts_with("PK\u{3}\u{4}"));
-    assert!(begins("--poses", "a.glb").starts_with("glTF"));
     assert!(begins("--picture", "a.png").starts_with("\u{fffd}PNG"));
     // An animated PNG is one by its chunk `acTL`, whatever it is called.
     for (name, moves) in [("still.png", false), ("moving.apng", true), ("moving.apng.png", true)] {
@@ -103,7 +102,7 @@ fn a_file_that_cannot_be_written_is_refused_before_the_run() {
         }
         assert!(!path.exists());
     };
-    refused("--poses", "poses.csv", &["expected a name that ends in .npz or .glb"]);
+    refused("--poses", "poses.csv", &["expected a name that ends in .npz"]);
     refused("--view", "view", &["expected a name that ends in .html"]);
     refused("--picture", "a.jpg", &["expected a name that ends in .png or .apng"]);
     refused(

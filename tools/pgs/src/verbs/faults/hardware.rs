@@ -12,8 +12,9 @@ use super::{FaultsArgs, list, try_all};
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Result, Verdict};
-use pgs_command::output::SCHEMA;
 use pgs_command::output::table::{Cell as Shown, Table, text};
+use pgs_command::output::width::terminal;
+use pgs_command::output::{BAD, SCHEMA};
 
 /// A cell, and its results on the model and on the hardware.
 struct Pair {
@@ -100,11 +101,11 @@ fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<()> {
             ("equal", "equal\ncells", equal),
         ]);
     }
-    write!(out, "{}", table.to_text(usize::MAX))?;
+    write!(out, "{}", table.to_text(usize::MAX, terminal()))?;
     for pair in pairs.iter().filter(|pair| !pair.equal()) {
         writeln!(
             out,
-            "FAILED '{}': model {}, hardware {} ({})",
+            "{BAD}FAILED{BAD:#} '{}': model {}, hardware {} ({})",
             pair.cell.plan,
             pair.model.cause.unwrap_or("none"),
             pair.hardware.cause.unwrap_or("none"),

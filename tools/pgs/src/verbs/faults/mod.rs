@@ -26,6 +26,7 @@ use pgs_command::environment;
 use pgs_command::failure::{Result, Verdict};
 use pgs_command::options::build::BuiltArgs;
 use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::whole;
 use pgs_command::output::progress::progress_bar;
 
 const EXAMPLES: &str = "\
@@ -126,7 +127,7 @@ fn list(
     }
     for (name, cells) in profiles {
         for cell in cells {
-            writeln!(out, "{name:12} {}", cell.plan)?;
+            whole(out, "", 0, &format!("{name} {}", cell.plan))?;
         }
     }
     Ok(Verdict::Done)
