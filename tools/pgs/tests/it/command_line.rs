@@ -96,6 +96,23 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
 }
 
 #[test]
+fn a_wrong_verb_or_option_gets_a_suggestion() {
+    for (words, similar) in [
+        ("chekc", "check"),
+        ("solv x", "solve"),
+        ("thesis determinsm", "determinism"),
+        ("--stps 4", "--steps"),
+        ("run --boards emulated", "--board"),
+        ("serve --sockets x", "--socket"),
+    ] {
+        let ran = run(words.split(' '));
+        assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+        let tip = ran.stderr.lines().find(|line| line.contains("similar"));
+        assert!(tip.is_some_and(|tip| tip.contains(similar)), "{words}: {}", ran.stderr);
+    }
+}
+
+#[test]
 fn a_wrong_board_is_refused_with_the_words_that_name_one() {
     for (board, part) in [
         ("abacus", "give auto, uio[:NODE], devmem, emulated[:BUILD] or socket:PATH"),
