@@ -16,6 +16,15 @@ pub fn fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
     labelled(out, &format!("{label:<LABEL$}"), LABEL, text, stdout_width())
 }
 
+/// The same; a file or a pipe gets it in one line.
+///
+/// # Errors
+///
+/// Fails where the output takes no more.
+pub fn whole_fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
+    whole(out, &format!("{label:<LABEL$}"), LABEL, text)
+}
+
 /// Writes a text behind a label of `indent` columns. A terminal gets lines of its width, a file or a
 /// pipe gets one line, which programs can search.
 ///

@@ -17,6 +17,7 @@ use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
 use pgs_command::options::build::{BuiltArgs, described};
 use pgs_command::options::planned::PlannedArgs;
+use pgs_command::output::facts::whole_fact;
 use pgs_command::output::files::{Files, Named};
 use pgs_command::output::{REFUSED, SCHEMA};
 
@@ -100,16 +101,17 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
     interrupt::take_over(move || at_signal.stop());
 
     if !common.json {
-        writeln!(out, "board      {}", described(&config))?;
+        let mut line = |label: &str, text: String| whole_fact(out, label, &text);
+        line("board", described(&config))?;
         if let Some((simulator, _)) = common.accelerator.simulator() {
-            writeln!(out, "simulator  {}", simulator.display())?;
+            line("simulator", simulator.display().to_string())?;
         }
         if let Some(plan) = &planned {
-            writeln!(out, "faults     {plan}")?;
+            line("faults", plan.to_string())?;
         }
         let bytes = grouped(bytes);
-        writeln!(out, "memory     {bytes} bytes at {MEMORY_BASE:#x}, new for each driver")?;
-        writeln!(out, "serving    pgs --board socket:{}", args.socket.display())?;
+        line("memory", format!("{bytes} bytes at {MEMORY_BASE:#x}, new for each driver"))?;
+        line("serving", format!("pgs --board socket:{}", args.socket.display()))?;
         out.flush()?;
     }
     let mut tally = Tally::default();
@@ -154,14 +156,13 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
         });
         writeln!(out, "{document:#}")?;
     } else {
-        writeln!(
-            out,
-            "served     {} drivers, {} left engines running; {} requests, {} violations",
-            grouped(drivers),
-            grouped(left_running),
-            grouped(requests),
-            grouped(violations),
-        )?;
+        let [drivers, left, requests, violations] =
+            [drivers, left_running, requests, violations].map(grouped);
+        let text = format!(
+            "{drivers} drivers, {left} left engines running; {requests} requests, {violations} \
+             violations"
+        );
+        whole_fact(out, "served", &text)?;
     }
     match dead {
         Some(reason) => {
@@ -179,13 +180,14 @@ fn at(number: u64) -> usize {
 /// Reports a driver that has left.
 fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
     let Visit { requests, ended, left_running, .. } = visit;
-    write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;
-    match ended {
-        Ended::Left => write!(out, "left")?,
-        Ended::Refused(error) => write!(out, "{REFUSED}refused{REFUSED:#}: {error}")?,
-        Ended::Broken(error) => write!(out, "broken off: {error}")?,
-        _ => write!(out, "gone")?,
-    }
-    writeln!(out, ", {}", if *left_running { "engines running" } else { "engines at rest" })?;
+    let ended = match ended {
+        Ended::Left => "left".to_owned(),
+        Ended::Refused(error) => format!("{REFUSED}refused{REFUSED:#}: {error}"),
+        Ended::Broken(error) => format!("broken off: {error}"),
+        _ => "gone".to_owned(),
+    };
+    let engines = if *left_running { "engines running" } else { "engines at rest" };
+    let text = format!("{} requests, {ended}, {engines}", grouped(*requests));
+    whole_fact(out, &format!("driver {number:<3}"), &text)?;
     out.flush()
 }

@@ -22,7 +22,7 @@ use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
 use pgs_command::output::SCHEMA;
-use pgs_command::output::facts::{fact, whole};
+use pgs_command::output::facts::{fact, whole_fact};
 use pgs_command::output::files::{Files, Named, unwritten};
 use pgs_command::output::order;
 use pgs_command::output::{limit_text, milliseconds};
@@ -338,7 +338,7 @@ impl StepResult {
     fn print(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let Self { report, parameters, energy: [before, after], .. } = self;
         let (saturated, modelled) = (report.saturated, milliseconds(report.modelled_time()));
-        let mut line = |label: &str, text: String| whole(out, &format!("{label:<11}"), 11, &text);
+        let mut line = |label: &str, text: String| whole_fact(out, label, &text);
         line(
             "step",
             format!(

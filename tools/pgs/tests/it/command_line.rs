@@ -53,7 +53,7 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         &["list", "--board", "abacus"],
         &["solve"],
         &["solve", "/nonexistent"],
-        &["thesis", "step", "--collisions", "1"],
+        &["thesis", "cycles", "--collisions", "1"],
         &["solve", folder, "--compare", "--contact-iterations", "3"],
         &[
             "solve",
@@ -92,6 +92,23 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         assert!(ran.stderr.starts_with("error: "), "{arguments:?}: {}", ran.stderr);
         assert!(!ran.stderr.contains("panicked"), "{arguments:?}: {}", ran.stderr);
         assert!(ran.stdout.is_empty(), "{arguments:?}: {}", ran.stdout);
+    }
+}
+
+#[test]
+fn a_wrong_verb_or_option_gets_a_suggestion() {
+    for (words, similar) in [
+        ("chekc", "check"),
+        ("solv x", "solve"),
+        ("thesis determinsm", "determinism"),
+        ("--stps 4", "--steps"),
+        ("run --boards emulated", "--board"),
+        ("serve --sockets x", "--socket"),
+    ] {
+        let ran = run(words.split(' '));
+        assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+        let tip = ran.stderr.lines().find(|line| line.contains("similar"));
+        assert!(tip.is_some_and(|tip| tip.contains(similar)), "{words}: {}", ran.stderr);
     }
 }
 
@@ -438,7 +455,7 @@ fn a_full_stdout_is_named_and_ends_with_2() {
         &["--grid", "2x2x2", "--steps", "2", "--json"],
         &["thesis", "compare", "float", "half", "--grid", "2x2x2", "--steps", "1"],
         &["list"],
-        &["thesis", "step", "--collisions", "1", "--bodies", "2"],
+        &["thesis", "cycles", "--collisions", "1", "--bodies", "2"],
         &["check"],
         &["faults", "--list", "--board", "emulated:naive"],
     ] {
