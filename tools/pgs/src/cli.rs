@@ -224,7 +224,7 @@ mod tests {
             "pgs --board emulated",
             "pgs solve x --memory uio --board uio",
             "pgs thesis",
-            "pgs thesis step",
+            "pgs thesis cycles",
             "pgs load x",
             "pgs thesis detection --input x",
         ] {
@@ -317,7 +317,7 @@ mod tests {
             parsed(&format!("pgs {verb} --board uio")).expect_err(verb);
             parsed(&format!("pgs {verb} --accelerator rtl:x")).expect(verb);
         }
-        for verb in ["thesis step", "thesis ladder", "thesis detection --input x", "load x"] {
+        for verb in ["thesis cycles", "thesis ladder", "thesis detection --input x", "load x"] {
             for option in ["--board uio", "--memory uio", "--accelerator model"] {
                 let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
                 assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
@@ -325,7 +325,7 @@ mod tests {
         }
         let real = parsed_in("uio", "uio:m", "pgs thesis formats").expect("a board");
         assert!(is_uio(&real.board, UIO_NODE));
-        for line in ["pgs faults", "pgs thesis half", "pgs thesis step", "pgs serve --socket x"] {
+        for line in ["pgs faults", "pgs thesis half", "pgs thesis cycles", "pgs serve --socket x"] {
             let own = parsed_in("uio", "uio:m", line).expect(line).board;
             assert!(matches!(own, BoardChoice::Automatic), "{line}");
         }
@@ -360,8 +360,8 @@ mod tests {
             "pgs --manager fpga",
             "pgs --board served",
             "pgs serve",
-            "pgs thesis step --collisions -1 --bodies 1",
-            "pgs thesis step --collisions 1",
+            "pgs thesis cycles --collisions -1 --bodies 1",
+            "pgs thesis cycles --collisions 1",
             "pgs solve",
             "pgs frobnicate",
         ] {

@@ -44,9 +44,14 @@ pub(crate) struct Arrays<'py> {
 }
 
 impl<'py> Arrays<'py> {
-    /// The bodies of a step: a structured array, or a dict of arrays.
+    /// The bodies of a step: a structured array, or a dict of arrays. Their numbers are all f32 or,
+    /// as the positions tell, all f64.
     pub(crate) fn of_bodies(given: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let (float, index) = (&dtype::<f32>(given.py()), &dtype::<u32>(given.py()));
+        let (index, double) = (&dtype::<u32>(given.py()), dtype::<f64>(given.py()));
+        let position = given.get_item("position").ok();
+        let found = position.as_ref().and_then(|of| of.cast::<PyUntypedArray>().ok());
+        let is_double = found.is_some_and(|array| array.dtype().is_equiv_to(&double));
+        let float = &if is_double { double } else { dtype::<f32>(given.py()) };
         let (mut kept, mut counts) = (Vec::new(), Vec::new());
         let mut of = |field: &str, element, width| {
             let name = format!("bodies[{field:?}]");
@@ -68,6 +73,7 @@ impl<'py> Arrays<'py> {
             angular_velocities: of("angular_velocity", float, Some(3))?,
             shapes: read_only(of("shape", index, None)?),
             count: counts[0],
+            number_size: float.itemsize(),
             ..BodyArrays::default()
         };
         if counts.iter().any(|count| *count != bodies.count) {

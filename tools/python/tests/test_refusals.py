@@ -42,7 +42,9 @@ def overlapping(bodies):
 
 
 BAD_BODIES = {
-    "f8": (changed("position", lambda a: a.astype(float)), TypeError, "position.*float64, expected float32"),
+    "f8": (changed("orientation", lambda a: a.astype(float)), TypeError, "orientation.*float64, expected float32"),
+    "f4": (changed("position", lambda a: a.astype(float)), TypeError, "orientation.*float32, expected float64"),
+    "f2": (changed("position", lambda a: a.astype(np.float16)), TypeError, "position.*float16, expected float32"),
     "big-endian": (changed("position", lambda a: a.astype(">f4")), TypeError, "position.*>f4"),
     "list": (changed("orientation", lambda a: a.tolist()), TypeError, "orientation.*list"),
     "signed": (changed("shape", lambda a: a.astype(np.int32)), TypeError, "shape.*int32, expected uint32"),

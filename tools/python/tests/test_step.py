@@ -71,6 +71,19 @@ def test_every_layout_is_changed_in_place_to_the_same_bits(board):
             assert view.tobytes() == expected[field].tobytes(), (name, field)
 
 
+def test_doubles_get_the_results_and_keep_the_digits_of_numbers_that_stay(board):
+    bodies, collisions = pile(20)
+    board.set_shapes(SHAPES)
+    doubles = {field: bodies[field].astype(float) for field in FIELDS} | {"shape": bodies["shape"].copy()}
+    doubles["position"][0] = 0.1
+    bodies["position"][0] = 0.1
+    board.step(bodies, collisions)
+    board.step(doubles, collisions)
+    for field in FIELDS:
+        assert np.array_equal(doubles[field].astype(np.float32), bodies[field]), field
+    assert (doubles["position"][0] == 0.1).all(), "the static body"
+
+
 def test_collisions_may_lie_apart(board):
     bodies, collisions = pile(20)
     board.set_shapes(SHAPES)

@@ -19,7 +19,8 @@ use crate::{compare, detect, formats, formulas, order, study};
 const EXAMPLES: &str = "\
 Examples:
   pgs thesis                                    the list of experiments
-  pgs thesis step --collisions 127000 --bodies 38880
+  pgs thesis step                               the headline: two designs, time and energy
+  pgs thesis cycles --collisions 90000 --bodies 38880
   pgs thesis determinism --input tests/golden/pile5_step60
   pgs thesis ladder --markdown
   pgs thesis --all --out report                 all of them: one page, Markdown, JSON, figures
@@ -50,6 +51,7 @@ pub(crate) fn experiments() -> Vec<&'static Experiment> {
         &study::split::SPLIT,
         &study::pile::PILE,
         &study::stages::STAGES,
+        &study::step::STEP,
         &study::determinism::ORDERS,
         &study::half::HALF,
         &study::ladder::LADDER,
@@ -206,6 +208,7 @@ pub(crate) mod tests {
             "time-step --grid 2x2x2",
             "stopping --grid 2x2x2",
             "split --grid 2x2x2",
+            "step --grid 2x2x2",
             "determinism --grid 2x2x2",
             "half --grid 2x2x2 --build half",
             "compare float half --grid 2x2x2",

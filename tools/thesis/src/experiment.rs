@@ -12,10 +12,11 @@ use serde_json::{Value, json};
 use crate::figure::Figure;
 use crate::index::{Row, section_key};
 use crate::session::Session;
+use crate::study::step::PILES;
 use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
-pub(crate) const SCHEMA: u32 = 4;
+pub(crate) const SCHEMA: u32 = 5;
 
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
@@ -123,9 +124,10 @@ impl Part {
         self.rows.append(&mut other.rows);
     }
 
-    /// Sorts by the sections of the thesis; within one, figures and rows keep their order.
+    /// Sorts by the sections of the thesis; within one, figures and rows keep their order. The
+    /// piles of the headline come first.
     pub(crate) fn sort(&mut self) {
-        self.figures.sort_by_key(|figure| section_key(figure.thesis));
+        self.figures.sort_by_key(|figure| (figure.id != PILES, section_key(figure.thesis)));
         self.rows.sort_by_key(|row| section_key(&row.thesis));
     }
 

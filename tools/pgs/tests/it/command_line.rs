@@ -53,7 +53,7 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
         &["list", "--board", "abacus"],
         &["solve"],
         &["solve", "/nonexistent"],
-        &["thesis", "step", "--collisions", "1"],
+        &["thesis", "cycles", "--collisions", "1"],
         &["solve", folder, "--compare", "--contact-iterations", "3"],
         &[
             "solve",
@@ -455,7 +455,7 @@ fn a_full_stdout_is_named_and_ends_with_2() {
         &["--grid", "2x2x2", "--steps", "2", "--json"],
         &["thesis", "compare", "float", "half", "--grid", "2x2x2", "--steps", "1"],
         &["list"],
-        &["thesis", "step", "--collisions", "1", "--bodies", "2"],
+        &["thesis", "cycles", "--collisions", "1", "--bodies", "2"],
         &["check"],
         &["faults", "--list", "--board", "emulated:naive"],
     ] {

@@ -49,7 +49,7 @@ fn a_board_of_the_environment_that_is_not_taken_is_named() {
         }
     }
     // No board at all.
-    assert_eq!(said(&["thesis", "step"], "uio"), "");
+    assert_eq!(said(&["thesis", "cycles"], "uio"), "");
 }
 
 #[test]

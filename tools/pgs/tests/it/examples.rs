@@ -203,9 +203,8 @@ fn in_small(command: &str) -> Option<String> {
         ("faults", _) if !has(&words, "--list") => return None,
         ("thesis", "--all") => return None,
         ("solve" | "list" | "check" | "faults" | "load" | "serve", _)
-        | ("thesis", "" | "ladder" | "--help" | "detection" | "step" | "data" | "memory") => {}
-        ("thesis", "streams" | "ports" | "warm" | "comparison" | "euler") => {}
-        ("thesis", "mixed" | "windowed") => {}
+        | ("thesis", "" | "ladder" | "--help" | "detection" | "cycles" | "data" | "memory") => {}
+        ("thesis", "warm" | "comparison" | "euler") => {}
         _ if has(&words, "--help") || has(&words, "--version") => {}
         ("thesis", "stopping") => {
             with(&mut words, "--passes", "16");

@@ -65,7 +65,6 @@ fn the_name_of_a_file_tells_its_format() {
         String::from_utf8_lossy(&fs::read(&path).expect("a file")[..20]).into_owned()
     };
     assert!(begins("--poses", "a.npz").starts_with("PK\u{3}\u{4}"));
-    assert!(begins("--poses", "a.glb").starts_with("glTF"));
     assert!(begins("--picture", "a.png").starts_with("\u{fffd}PNG"));
     // An animated PNG is one by its chunk `acTL`, whatever it is called.
     for (name, moves) in [("still.png", false), ("moving.apng", true), ("moving.apng.png", true)] {
@@ -103,7 +102,7 @@ fn a_file_that_cannot_be_written_is_refused_before_the_run() {
         }
         assert!(!path.exists());
     };
-    refused("--poses", "poses.csv", &["expected a name that ends in .npz or .glb"]);
+    refused("--poses", "poses.csv", &["expected a name that ends in .npz"]);
     refused("--view", "view", &["expected a name that ends in .html"]);
     refused("--picture", "a.jpg", &["expected a name that ends in .png or .apng"]);
     refused(

@@ -118,7 +118,6 @@ fn every_file_that_finds_no_room_has_a_next_step() {
     let (run, solve) = (vec!["run", "--grid", "4x4x4", "--steps", "2"], vec!["solve", text(&step)]);
     for (verb, option, name) in [
         (&run, "--poses", "poses.npz"),
-        (&run, "--poses", "poses.glb"),
         (&run, "--view", "page.html"),
         (&run, "--picture", "last.png"),
         (&run, "--trace", "step.json"),

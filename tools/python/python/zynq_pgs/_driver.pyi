@@ -16,8 +16,9 @@ COLLISION: np.dtype[np.void]
 a `distance`, negative where the bodies overlap."""
 
 Bodies = Union[NDArray[np.void], Mapping[str, NDArray[Any]]]
-"""An array with the fields of `BODY` and any others, or a dict of arrays by the same names: float32 of 3 or 4 columns,
-and uint32 for `shape`. Rows may lie any distance apart; the numbers of a row are dense. Nothing is copied."""
+"""An array with the fields of `BODY` and any others, or a dict of arrays by the same names: float32 or float64, all
+alike, of 3 or 4 columns, and uint32 for `shape`. The board rounds float64. Rows may lie any distance apart; the numbers
+of a row are dense. Nothing is copied."""
 
 class Parameters(TypedDict, total=False):
     """The parameters of a step; Bullet's where they are not given."""

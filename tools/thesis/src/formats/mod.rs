@@ -32,7 +32,7 @@ Examples:
 The numbers are the ones that a step streams to the board, without unused contact points, indices
 and counts. The sum \"as streamed\" has the positions of both bodies with every collision, the sum
 \"each once\" has the position of each body once. Relative numbers have the position of body A
-subtracted, as the profile mixed streams them; a static body counts as being at the other body's
+subtracted; a static body counts as being at the other body's
 position. Neither sum includes the relative numbers.
 
 Relative errors are |read back - number| / |number|. A zero has no relative error, and does not

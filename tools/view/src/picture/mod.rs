@@ -45,14 +45,14 @@ const SHADOW: f32 = 0.62;
 /// Seconds that the last moment of a moving picture stays.
 const END: f32 = 1.5;
 
-/// Most pixels a side, and in all: the finer picture has four times as many, of 32 bytes each.
+/// Most pixels a side, and in all: each has four finer ones of 32 bytes.
 const SIDE_MOST: u16 = 16_384;
 const PIXELS_MOST: u32 = 1 << 23;
 
 /// A picture to draw.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
-    /// The bodies at their moments. Those of one kind have the colour of their height at the first.
+    /// The bodies at their moments. Bodies of one kind have the colour of their height at the first.
     pub recording: &'a Recording,
     /// Where it is taken from.
     pub camera: Camera,
@@ -62,7 +62,7 @@ pub struct Picture<'a> {
     pub height: u16,
 }
 
-/// What all moments of a picture have in common.
+/// The parts of a picture that all moments share.
 struct Stage<'a> {
     surfaces: Surfaces<'a>,
     view: View,

@@ -12,7 +12,7 @@ use crate::error::ViewError;
 /// A picture: red, green and blue of each pixel.
 pub(super) type Pixels = Vec<[u8; 3]>;
 
-/// A picture that stays for that many seconds.
+/// A picture, and the seconds that it stays.
 pub(super) type Moment = (Pixels, f32);
 
 /// The index of a pixel that stays as it was, and the number of colours beside it.
@@ -149,7 +149,7 @@ mod tests {
             assert_eq!(control.delay_num, milliseconds(*seconds));
             shown.resize(12, [0; 4]);
             let (width, height) = (control.width as usize, control.height as usize);
-            // Of the second, the rectangle around the places 1 and 6; of the third, nothing.
+            // The second has the rectangle around the places 1 and 6, the third has no change.
             assert_eq!((width, height), [(4, 3), (2, 2), (1, 1)][index]);
             for (place, pixel) in buffer.chunks(4).take(width * height).enumerate() {
                 let y = control.y_offset as usize + place / width;

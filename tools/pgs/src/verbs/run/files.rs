@@ -1,6 +1,8 @@
-//! The files of a run's poses: arrays, glTF, a page and a picture.
+//! The files of a run's poses: arrays, a page and a picture.
 
 use std::io::Write as _;
+#[cfg(feature = "live")]
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,7 +12,9 @@ use step_folder::replace::replace;
 use thiserror::Error;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
-use zynq_pgs_view::{ViewError, gltf, npz};
+#[cfg(feature = "live")]
+use zynq_pgs_view::{Recording, live::Live};
+use zynq_pgs_view::{ViewError, npz};
 
 use super::film::Film;
 use pgs_command::failure::{Cause, Failure, Result};
@@ -24,12 +28,11 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the
-    /// arrays.
+    /// Write the poses as arrays for numpy; `docs/command-line.md` has their shapes.
     #[arg(
         long,
-        value_name = "FILE.npz|glb",
-        value_parser = |text: &str| with_extension(text, &["npz", "glb"])
+        value_name = "FILE.npz",
+        value_parser = |text: &str| with_extension(text, &["npz"])
     )]
     poses: Option<PathBuf>,
     /// Write a page that plays the poses
@@ -51,6 +54,13 @@ pub(crate) struct FileArgs {
         value_parser = |text: &str| with_extension(text, &["png", "apng"])
     )]
     picture: Option<PathBuf>,
+    /// Serve a page that plays the run while the board steps, on this machine, or at an ADDRESS of
+    /// its network
+    ///
+    /// The command prints the address of the page, which has a random token.
+    #[cfg(feature = "live")]
+    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = loopback_or)]
+    live: Option<SocketAddr>,
     /// Frames of a simulated second, a step each [default: about 200 of the run]
     #[arg(long, value_name = "N", value_parser = frames_per_second)]
     fps: Option<f32>,
@@ -59,6 +69,14 @@ pub(crate) struct FileArgs {
 fn frames_per_second(text: &str) -> Result<f32, String> {
     let frames = text.parse().ok().filter(|frames| (0.01..=1e6).contains(frames));
     frames.ok_or_else(|| "expected frames of a second, from 0.01 to 1000000".to_owned())
+}
+
+/// An address with a port; a port alone is one of this machine.
+#[cfg(feature = "live")]
+fn loopback_or(text: &str) -> Result<SocketAddr, String> {
+    let port = text.parse().map(|port: u16| (Ipv4Addr::LOCALHOST, port).into());
+    let address = port.or_else(|_| text.parse());
+    address.map_err(|_| "expected a port, or an address with one as 192.0.2.7:8000".to_owned())
 }
 
 fn extension(path: &Path) -> &str {
@@ -130,6 +148,23 @@ impl FileArgs {
         Film::new(scene, a_step, time_step).map(Some)
     }
 
+    /// Begins to serve the page of a run that steps, and prints its address; `None` without the option.
+    #[cfg(feature = "live")]
+    pub(super) fn live(
+        &self,
+        scene: &Scene,
+        title: &str,
+        facts: &[(&str, String)],
+    ) -> Result<Option<Live>> {
+        let Some(address) = self.live else { return Ok(None) };
+        let mut start = Recording::new(scene.bodies(), scene.geometries());
+        let live = start.add(0, 0.0, scene.bodies());
+        let live = live.and_then(|()| Live::start(address, &start, title, facts));
+        let live = live.map_err(|error| Failure::new(Cause::Output, error))?;
+        writeln!(std::io::stderr(), "live at {}", live.url())?;
+        Ok(Some(live))
+    }
+
     /// Writes the files of a course; returns what was written.
     pub(super) fn write(
         &self,
@@ -142,10 +177,7 @@ impl FileArgs {
         let bodies = grouped(recording.bodies() as u64);
         let mut written = Vec::new();
         if let Some(path) = &self.poses {
-            let bytes = match extension(path) {
-                "glb" => gltf::binary(recording),
-                _ => npz::bytes(recording).map_err(ViewError::from),
-            };
+            let bytes = npz::bytes(recording).map_err(ViewError::from);
             let bytes = bytes.map_err(|error| Unfit::failure(path, error))?;
             let text = format!("{frames} frames of {bodies} bodies");
             written.push(Written::new("poses", path, &bytes, text, json!({ "frames": frames }))?);

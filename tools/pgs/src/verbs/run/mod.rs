@@ -16,6 +16,8 @@ use serde_json::Value;
 use zynq_pgs::board::BoardKind;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Capabilities, StepParameters, StepReport};
+#[cfg(feature = "live")]
+use zynq_pgs_view::live::Live;
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
@@ -33,9 +35,13 @@ use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::scenes::{ITERATIONS, STEPS, SceneArgs};
+#[cfg(feature = "live")]
+use pgs_command::options::solver::time_of;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
 use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
+#[cfg(feature = "live")]
+use pgs_command::output::milliseconds;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
 use pgs_command::output::table::{Fixed, heading, line};
@@ -58,6 +64,7 @@ Examples:
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
   pgs run --scene shapes --steps 90 --picture pile.apng          a picture that moves
+  pgs run --live 8000                            a page that plays while the board steps
   pgs run --poses pile.npz --fps 15              fifteen poses of a second, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
@@ -227,6 +234,9 @@ struct Course {
     energy: Option<(String, Value)>,
     /// The poses for the files.
     film: Option<Film>,
+    /// The page that plays the run while it steps.
+    #[cfg(feature = "live")]
+    live: Option<Live>,
     /// Whether the files of the traced step were written.
     inside: TraceFiles,
 }
@@ -262,13 +272,25 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     opened.inject(&args.planned, &parameters)?;
     course.film = args.files.film(&scene, args.steps(), parameters.time_step)?;
 
+    #[cfg(feature = "live")]
+    {
+        let facts = facts(args, &opened, &parameters);
+        course.live = args.files.live(&scene, &args.scene.text(), &facts)?;
+    }
     let meter = energy::start(sensors, course.cold.is_none());
     let scenes = (&mut scene, &mut course);
     let with = (&parameters, tracing.as_ref());
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
+    #[cfg(feature = "live")]
+    if let Some(live) = course.live.take() {
+        let time = time_of(course.done, parameters.time_step);
+        let mean = board_time(&opened, course.totals.mean());
+        let note = format!("{} steps, {mean} on average", course.done);
+        live.end((course.done, time), &note, scene.bodies());
+    }
     course.energy = energy::end(meter, course.done);
     let complete = course.is_complete(args.steps());
-    let written = write_files(args, &opened, &scene, &mut course)?;
+    let written = write_files(args, &opened, &parameters, &scene, &mut course)?;
     if common.json {
         let mut document = document(args, &parameters, &opened, &mut scene, course);
         for file in written {
@@ -286,22 +308,49 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
+/// The facts of a run on its page.
+fn facts(
+    args: &RunArgs,
+    opened: &OpenBoard,
+    parameters: &StepParameters,
+) -> [(&'static str, String); 4] {
+    let StepParameters { contact_iterations, friction_iterations, warm_start, .. } = parameters;
+    let warm = if *warm_start { ", and one more of each for a warm start" } else { "" };
+    let profile = opened.accelerator.capabilities().variant.profile.name;
+    [
+        ("scene", args.scene.text()),
+        ("board", opened.accelerator.board().to_string()),
+        ("profile", profile.to_owned()),
+        (
+            "passes of a step",
+            format!(
+                "{contact_iterations} over contacts, {friction_iterations} over friction{warm}"
+            ),
+        ),
+    ]
+}
+
+/// The time of a step on the board, in words.
+fn board_time(opened: &OpenBoard, milliseconds: f64) -> String {
+    let modelled = if is_emulated(opened) { " (modelled)" } else { "" };
+    format!("{milliseconds:.3} ms a step on the board{modelled}")
+}
+
 /// Writes the files of the poses.
 fn write_files(
     args: &RunArgs,
     opened: &OpenBoard,
+    parameters: &StepParameters,
     scene: &Scene,
     course: &mut Course,
 ) -> Result<Vec<Written>> {
     let Some(film) = &mut course.film else { return Ok(Vec::new()) };
     film.end(course.done, scene)?;
+    let mut facts = facts(args, opened, parameters).to_vec();
     let digest = digest::of_bodies(scene.bodies());
-    let facts = [
-        ("scene", args.scene.text()),
-        ("board", opened.accelerator.board().to_string()),
-        ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
-        ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
-    ];
+    facts.push(("time", board_time(opened, course.totals.mean()) + " on average"));
+    facts.push(("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))));
+    facts.push(("digest", format!("{} {digest:016x}", digest::ALGORITHM)));
     args.files.write(film, &args.scene.text(), &facts)
 }
 
@@ -345,6 +394,13 @@ fn take_steps(
         course.done += 1;
         if let Some(film) = &mut course.film {
             film.step(course.done, scene)?;
+        }
+        #[cfg(feature = "live")]
+        if let Some(live) = &mut course.live {
+            let time = time_of(course.done, parameters.time_step);
+            let modelled = milliseconds(row.report.modelled_time());
+            let note = || format!("step {}, {}", course.done, board_time(opened, modelled));
+            live.show((course.done, time), note, scene.bodies());
         }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
