@@ -12,11 +12,13 @@ use serde_json::{Value, json};
 use crate::figure::Figure;
 use crate::index::{Row, section_key};
 use crate::session::Session;
-use crate::study::step::PILES;
 use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub(crate) const SCHEMA: u32 = 5;
+
+/// The figure that opens the page of all experiments.
+pub(crate) const PILES: &str = "piles";
 
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";

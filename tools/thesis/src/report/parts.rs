@@ -175,9 +175,9 @@ fn words(text: &str) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::command::tests::parsed;
+    use crate::experiment::PILES;
     use crate::index::{Origin, section_key};
     use crate::report::AllArgs;
-    use crate::study::step::PILES;
     use crate::table::Table;
     use clap::{Args as _, Command, FromArgMatches as _};
     use serde_json::Value;

@@ -23,7 +23,7 @@ use zynq_pgs_view::{Recording, ViewError};
 
 use super::start::World;
 use crate::estimate::thesis::recorded::{Design, FLOAT_DESIGN, HALF_DESIGN};
-use crate::experiment::{Boards, Experiment, Measure, Part, shown};
+use crate::experiment::{Boards, Experiment, Measure, PILES, Part, shown};
 use crate::figure::Figure;
 use crate::index::{Origin, Row};
 use crate::session::Session;
@@ -72,9 +72,6 @@ const STEPS: u32 = 120;
 const SIZE: [u16; 2] = [600, 400];
 /// Its distance, of the distance at which our pile fills the picture.
 const AWAY: f32 = 1.7;
-
-/// The figure of both piles.
-pub(crate) const PILES: &str = "piles";
 
 /// What the thesis says of hazards.
 const CLAIM: &str = "recorded (§5.4.4): the dependences between collisions are declared false, \
