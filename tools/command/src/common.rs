@@ -2,7 +2,7 @@
 //! manager, accelerator.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ColorChoice};
 use zynq_pgs::BoardChoice;
@@ -130,27 +130,12 @@ impl Given {
     }
 }
 
-/// The accelerator of an emulated board.
+/// The accelerator of an emulated board: the built-in model, or a simulator.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum AcceleratorChoice {
-    /// The built-in model.
-    #[default]
-    Model,
-    /// A simulator of the generated Verilog, at this path.
-    Rtl(PathBuf),
-    /// The simulator at this path, and the model in lock step with it.
-    Both(PathBuf),
-}
-
-impl AcceleratorChoice {
-    /// The path of the simulator, and whether the model runs beside it.
-    pub fn simulator(&self) -> Option<(&Path, bool)> {
-        match self {
-            Self::Model => None,
-            Self::Rtl(path) => Some((path, false)),
-            Self::Both(path) => Some((path, true)),
-        }
-    }
+pub struct AcceleratorChoice {
+    /// The path of a simulator of the generated Verilog, and whether the model runs beside it in
+    /// lock step.
+    pub simulator: Option<(PathBuf, bool)>,
 }
 
 /// The options of every verb, with the environment and the defaults filled in.
@@ -175,16 +160,12 @@ pub struct CommonArgs {
 /// Reads the choice of an accelerator.
 fn accelerator_choice(text: &str) -> Result<AcceleratorChoice, String> {
     match text.split_once(':') {
-        None if text == "model" => Ok(AcceleratorChoice::Model),
-        Some(("rtl", path)) if !path.is_empty() => Ok(AcceleratorChoice::Rtl(path.into())),
-        Some(("both", path)) if !path.is_empty() => Ok(AcceleratorChoice::Both(path.into())),
+        None if text == "model" => Ok(AcceleratorChoice::default()),
+        Some((kind @ ("rtl" | "both"), path)) if !path.is_empty() => {
+            Ok(AcceleratorChoice { simulator: Some((path.into(), kind == "both")) })
+        }
         _ => Err("expected model, rtl:PATH or both:PATH".to_owned()),
     }
-}
-
-/// Reads the path of a simulator.
-fn simulator_path(text: &str) -> Result<AcceleratorChoice, String> {
-    Ok(AcceleratorChoice::Rtl(text.into()))
 }
 
 /// Reads the choice of an FPGA manager.
@@ -211,7 +192,7 @@ impl CommonArgs {
             memory: MemoryChoice::Automatic,
             memory_of_environment: false,
             manager: ManagerChoice::Automatic,
-            accelerator: AcceleratorChoice::Model,
+            accelerator: AcceleratorChoice::default(),
         }
     }
 
@@ -278,7 +259,9 @@ impl CommonOptions {
                 );
             }
             Some(AcceleratorOptions { accelerator: None }) if emulated => {
-                instead_of("--accelerator", RTL, &variable, simulator_path)?
+                instead_of("--accelerator", RTL, &variable, |path| {
+                    Ok(AcceleratorChoice { simulator: Some((path.into(), false)) })
+                })?
             }
             options => options.and_then(|options| options.accelerator),
         };

@@ -39,7 +39,7 @@ const DETECTION: usize = 0;
 ///
 /// The script holds these, too.
 const SOFTWARE: [[[f64; 2]; 2]; 2] =
-    [[[1126.0, 165.0], [1315.0, 168.0]], [[954.0, 276.0], [1216.0, 272.0]]];
+    [[[1126.0, 165.0], [1315.0, 168.0]], [[1086.0, 271.0], [1343.0, 274.0]]];
 
 /// The item that a part handles.
 enum Of {

@@ -35,7 +35,7 @@ def test_two_hundred_worlds_in_one_step_have_the_bits_of_a_step_of_their_own(boa
               f" ({together.stalls:,} stalled); in {WORLDS} steps {cycles:,} ({stalls:,} stalled), and {cheapest:,} in the"
               " board's own order")
     page = (GOLDEN.parents[1] / "docs/engines.md").read_text()
-    assert all(f"{figure:,}" in page for figure in (together.cycles, cheapest, cycles)), "docs/engines.md has other figures"
+    assert all(f"{figure:,}" in page for figure in (together.cycles, cheapest)), "docs/engines.md has other figures"
     assert together.cycles * 5 < cheapest <= cycles and together.stalls * 10 < stalls
 
 

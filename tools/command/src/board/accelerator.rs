@@ -18,7 +18,7 @@ pub fn external_accelerator(
     config: &mut BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<Option<Box<dyn ExternalAccelerator>>> {
-    let Some((path, with_model)) = accelerator.simulator() else { return Ok(None) };
+    let Some((path, with_model)) = &accelerator.simulator else { return Ok(None) };
     let simulator = SimulatorProcess::start_for(config, path).map_err(|error| {
         let next = match error {
             ExternalError::Profile { .. } => {

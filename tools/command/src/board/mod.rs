@@ -8,7 +8,7 @@ use std::sync::Once;
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard};
 use serde_json::{Value, json};
 use zynq_pgs::board::BoardKind;
 use zynq_pgs::platform::MemoryChoice;
@@ -22,7 +22,7 @@ use crate::common::CommonArgs;
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure, Result};
-use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
+use crate::options::bandwidth::bandwidth_text;
 use crate::options::build::described;
 use crate::options::planned::{Injected, PlannedArgs};
 use crate::output::facts::fact;
@@ -314,10 +314,6 @@ impl OpenBoard {
         kind_text(self.accelerator.board().kind)
     }
 
-    fn profile(&self) -> &'static str {
-        self.accelerator.capabilities().variant.profile.name
-    }
-
     /// The profile with its formats and inertia, as the bitstream reports them.
     fn design(&self) -> String {
         let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
@@ -340,7 +336,7 @@ impl OpenBoard {
             can.mm2s_channels,
             can.s2mm_channels,
             can.initiation_interval,
-            hazards_text(can.interlocked),
+            if can.interlocked { "interlocked" } else { "unchecked" },
         );
         let bitstream = match can.queue {
             0 => bitstream,
@@ -365,7 +361,7 @@ impl OpenBoard {
         json!({
             "kind": self.kind(),
             "reason": self.reason,
-            "profile": self.profile(),
+            "profile": can.variant.profile.name,
             "design": self.design(),
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
@@ -384,12 +380,7 @@ impl OpenBoard {
             "bytes_per_collision": can.bytes_per_collision,
             "length_width": can.length_width,
             "address_width": can.address_width,
-            "emulation": self.config().map(|config| json!({
-                "build": described(&config),
-                "hazards": hazards_text(config.hazards == Hazards::Interlocked),
-                "window_slots": config.window_slots,
-                "bandwidth_bytes_per_second": bandwidth_number(config.bandwidth),
-            })),
+            "emulation": self.config().map(|config| json!({ "build": described(&config) })),
         })
     }
 
@@ -397,8 +388,4 @@ impl OpenBoard {
     pub fn config(&self) -> Option<BoardConfig> {
         self.observer.as_ref().map(EmulatedBoard::config)
     }
-}
-
-fn hazards_text(interlocked: bool) -> &'static str {
-    if interlocked { "interlocked" } else { "unchecked" }
 }

@@ -235,20 +235,14 @@ impl Table {
         let widths: Vec<usize> = (0..self.columns.len())
             .map(|k| lines.iter().map(|row| row[k].chars().count()).max().unwrap_or(0))
             .collect();
-        let (mut parts, mut used): (Vec<Vec<usize>>, usize) = (Vec::new(), usize::MAX);
-        for (k, width) in widths.iter().enumerate() {
-            match parts.last_mut() {
-                Some(part) if used + 2 + width <= columns || part.len() == 1 => part.push(k),
-                Some(_) => {
-                    parts.push(vec![0, k]);
-                    used = 2 + widths[0];
-                }
-                None => {
-                    parts.push(vec![0]);
-                    used = 0;
-                }
+        let mut parts = vec![Vec::new()];
+        for k in 0..widths.len() {
+            let taken = |part: &Vec<usize>| part.iter().map(|k| widths[*k] + 2).sum::<usize>();
+            let is_full = |part: &Vec<usize>| taken(part) + widths[k] + 2 > columns;
+            if parts.last().is_some_and(|part| part.len() > 1 && is_full(part)) {
+                parts.push(vec![0]);
             }
-            used += 2 + width;
+            parts.last_mut().into_iter().for_each(|part| part.push(k));
         }
         for (at, part) in parts.iter().enumerate() {
             out += if at > 0 { "\n" } else { "" };

@@ -103,7 +103,7 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
     if !common.json {
         let mut line = |label: &str, text: String| whole_fact(out, label, &text);
         line("board", described(&config))?;
-        if let Some((simulator, _)) = common.accelerator.simulator() {
+        if let Some((simulator, _)) = &common.accelerator.simulator {
             line("simulator", simulator.display().to_string())?;
         }
         if let Some(plan) = &planned {

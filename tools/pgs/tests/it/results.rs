@@ -164,7 +164,7 @@ fn an_output_that_is_another_output_or_an_input_is_refused_before_the_run() {
     assert_eq!(run(["solve", input, "--out", &out]).code, Some(0));
 }
 
-/// What a program prints and what it writes to the file behind stdout would destroy each other.
+/// The text of a program and the bytes of the same file behind stdout would destroy each other.
 #[test]
 fn an_output_that_is_the_file_of_stdout_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -100,7 +100,7 @@ impl Measure for CompareArgs {
         let common = session.emulated();
         let mut start = Start::load(&self.start)?;
         start.parameters.verify_order |= self.verify;
-        let model = CommonArgs { accelerator: AcceleratorChoice::Model, ..common.clone() };
+        let model = CommonArgs { accelerator: AcceleratorChoice::default(), ..common.clone() };
         let (mut boards, mut orders) = (Vec::new(), Vec::new());
         for (name, spec, common) in [("A", self.a, &model), ("B", self.b, &common)] {
             let about = |failure: Failure| failure.about(format!("board {name} ({spec})"));

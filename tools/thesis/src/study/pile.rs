@@ -90,8 +90,10 @@ impl Measure for Options {
             "38,880 cubes, 90,000 to 130,000 collisions",
             format!("{cubes}, up to {}", counted(most as u64, "collision")),
         );
-        row.command =
-            format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.png");
+        row.command = format!(
+            "pgs run --grid {grid} --fps {} --view pile.html --picture pile.png",
+            60 / EVERY
+        );
         let mut part = Part::of(Vec::new());
         part.figure(figure, [row]);
         Ok(part)

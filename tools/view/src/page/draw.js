@@ -15,7 +15,7 @@ uniform highp sampler2D bodies;
 uniform int firstBody;
 uniform mat4 matrix;
 uniform bool shadow;
-const vec3 LIGHT = vec3(-0.36, 0.8, 0.48); // Where it comes from.
+const vec3 LIGHT = vec3(${LIGHT.join(", ")});
 struct Body { vec3 position; vec4 rotation; vec3 colour; };
 Body bodyOf(int index) {
 	index += firstBody;
@@ -119,8 +119,10 @@ void main() {
 
 // Floats of a body in the texture: position and colour, quaternion.
 const FLOATS = 8;
-// Height of a centre above the ground, in radii around the body, from which it casts no shadow.
-const SHADOWLESS = 12;
+// From so many bodies on, only bodies whose centre is not higher than some radii cast a shadow: a
+// software renderer takes as long for the shadows of all as for the bodies.
+const MANY = 4096;
+const CONTACT = 2.5;
 // The brightness that a shadow leaves.
 const SHADOW = 0.66;
 // Steps of the depth by which bodies are sorted.
@@ -237,11 +239,13 @@ class Painter {
 		}
 	}
 
-	// Places all bodies that cast a shadow on the ground.
+	// Places the bodies that cast a shadow: all, or of many only the ones near the ground.
 	placeShadows(poses) {
+		const n = this.kinds.length;
 		for (const shape of this.shapes) shape.end = shape.begin;
-		for (let body = 0; body < this.kinds.length; body++) {
-			if (poses[7 * body + 1] < SHADOWLESS * this.around[this.kinds[body]]) this.put(body, poses, 0);
+		for (let body = 0; body < n; body++) {
+			const isNear = poses[7 * body + 1] < CONTACT * this.around[this.kinds[body]];
+			if (isNear || n < MANY) this.put(body, poses, 0);
 		}
 	}
 

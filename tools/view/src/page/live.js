@@ -7,6 +7,7 @@ function receive(recording) {
 	const over = text => {
 		source.close();
 		state.value = text;
+		recording.head.live = false;
 		window.player?.endLive();
 	};
 	return new Promise((first, never) => {
@@ -18,7 +19,7 @@ function receive(recording) {
 			first();
 		});
 		source.addEventListener("error", () => {
-			over("The run is gone: no more frames come.");
+			over("No more frames: the run is gone, or this page could not keep up.");
 			never(new Error("the run has ended, or has as many readers as it serves"));
 		});
 	});

@@ -21,7 +21,7 @@ use zynq_pgs::emulation::Build;
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
-use pgs_command::common::{AcceleratorChoice, AcceleratorOptions, CommonArgs};
+use pgs_command::common::{AcceleratorOptions, CommonArgs};
 use pgs_command::environment;
 use pgs_command::failure::{Result, Verdict};
 use pgs_command::options::build::BuiltArgs;
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -
         // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
     }
-    if common.accelerator != AcceleratorChoice::Model {
+    if common.accelerator.simulator.is_some() {
         return hardware::run(args, common, out);
     }
     let of_profile = |&profile| Build { profile: Some(profile), ..Build::default() };

@@ -165,7 +165,8 @@ impl State {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05 };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
-        let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
+        let (emulated, mut accelerator) =
+            open(config, &AcceleratorChoice::default(), scene.shapes())?;
         let parameters = start.parameters();
         let mut warm = WarmStart::default();
         for _ in 0..SETTLING {
@@ -226,7 +227,7 @@ impl Bench {
     fn of(config: BoardConfig, start: Start, deadline: Duration) -> Result<Self> {
         let (small, large) = (State::settled(3, config, start)?, State::settled(4, config, start)?);
         let parameters = start.parameters().with_deadline(deadline);
-        let accelerator = AcceleratorChoice::Model;
+        let accelerator = AcceleratorChoice::default();
         let (board, mut driver) = open(config, &accelerator, &small.shapes)?;
         let mut bodies = small.bodies.clone();
         driver.step(&mut bodies, &small.given(), &parameters).map_err(Failure::input)?;

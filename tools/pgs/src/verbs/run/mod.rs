@@ -63,7 +63,7 @@ Examples:
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
-  pgs run --scene shapes --picture pile.apng     a picture that moves
+  pgs run --scene shapes --steps 90 --picture pile.apng          a picture that moves
   pgs run --live 8000                            a page that plays while the board steps
   pgs run --poses pile.npz --fps 15              fifteen poses of a second, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
