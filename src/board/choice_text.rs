@@ -32,8 +32,7 @@ impl FromStr for BoardChoice {
 
 #[cfg(feature = "emulation")]
 fn emulated(build: Option<&str>) -> Result<BoardChoice, BoardTextError> {
-    let build = build.map(str::parse::<crate::emulation::Build>).transpose()?;
-    Ok(BoardChoice::Built(build.unwrap_or_default().config()))
+    Ok(BoardChoice::Built(build.map(str::parse).transpose()?.unwrap_or_default()))
 }
 
 #[cfg(not(feature = "emulation"))]
@@ -53,8 +52,6 @@ fn served(_: &str) -> Result<BoardChoice, BoardTextError> {
 
 #[cfg(all(test, feature = "emulation"))]
 mod tests {
-    use bitstream_model::BoardConfig;
-
     use super::*;
     use crate::emulation::BuildError;
 
@@ -72,10 +69,12 @@ mod tests {
             );
         }
         assert!(matches!(choice("devmem"), Ok(BoardChoice::DevMem(_))));
-        let default = BoardConfig::default();
-        assert!(matches!(choice("emulated"), Ok(BoardChoice::Built(config)) if config == default));
-        assert!(matches!(choice("emulated:half,f32"), Ok(BoardChoice::Built(config))
-            if config.profile.name == "half"));
+        let built = |text: &str, build: &str| {
+            let build = build.parse().unwrap_or_default();
+            assert!(matches!(choice(text), Ok(BoardChoice::Built(found)) if found == build));
+        };
+        built("emulated", "");
+        built("emulated:half,f32", "half,f32");
         let socket = choice("socket:/tmp/a:b").expect("a socket");
         assert!(matches!(socket, BoardChoice::Served { socket } if socket.ends_with("a:b")));
     }

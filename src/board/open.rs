@@ -59,8 +59,7 @@ impl OpenOptions {
     /// [`BoardTextError::Build`]: the text describes no build.
     #[cfg(feature = "emulation")]
     pub fn emulated(build: &str) -> Result<Self, BoardTextError> {
-        let build: crate::emulation::Build = build.parse()?;
-        Ok(Self { board: BoardChoice::Built(build.config()), ..Self::default() })
+        Ok(Self { board: BoardChoice::Built(build.parse()?), ..Self::default() })
     }
 }
 
@@ -84,7 +83,7 @@ pub enum BoardChoice {
     /// A new emulated board, built like this. To watch it or to make it fail, build it by hand and
     /// open its port ([`Self::Emulated`]).
     #[cfg(feature = "emulation")]
-    Built(bitstream_model::BoardConfig),
+    Built(crate::emulation::Build),
     /// An emulated board that was built before.
     #[cfg(feature = "emulation")]
     Emulated(bitstream_model::CpuPort),
@@ -171,7 +170,9 @@ pub(crate) fn find(
             real(registers, BoardKind::DevMem, "/dev/mem", "asked for")
         }
         #[cfg(feature = "emulation")]
-        BoardChoice::Built(config) => own_memory(memory).and_then(|()| built(*config, "asked for")),
+        BoardChoice::Built(build) => {
+            own_memory(memory).and_then(|()| built(build.config(), "asked for"))
+        }
         #[cfg(feature = "emulation")]
         BoardChoice::Emulated(port) => {
             own_memory(memory).map(|()| emulated(port.clone(), "asked for"))

@@ -91,24 +91,25 @@ pub(super) fn of_name(name: &str) -> Option<&'static BuildOption> {
     OPTIONS.iter().find(|option| option.bare && (option.names)().contains(&name))
 }
 
-/// Everything that may follow the profile, for people.
-pub(super) fn known() -> String {
-    let mut known: Vec<String> = Vec::new();
-    for option in &OPTIONS[1..] {
-        let names = (option.names)();
-        let stands = |name: &&str| of_name(name).is_some_and(|first| first.key == option.key);
-        known.extend(names.iter().copied().filter(stands).map(str::to_owned));
-        if !names.iter().all(stands) {
-            known.push(format!("{}={}", option.key, names.join("|")));
-        }
-        if !option.form.is_empty() {
-            known.push(format!("{}={}", option.key, option.form));
-        }
-    }
-    known.join(", ")
-}
-
 impl Build {
+    /// The words that may follow the profile in a text, for people.
+    #[must_use]
+    pub fn words() -> String {
+        let mut known: Vec<String> = Vec::new();
+        for option in &OPTIONS[1..] {
+            let names = (option.names)();
+            let stands = |name: &&str| of_name(name).is_some_and(|first| first.key == option.key);
+            known.extend(names.iter().copied().filter(stands).map(str::to_owned));
+            if !names.iter().all(stands) {
+                known.push(format!("{}={}", option.key, names.join("|")));
+            }
+            if !option.form.is_empty() {
+                known.push(format!("{}={}", option.key, option.form));
+            }
+        }
+        known.join(", ")
+    }
+
     /// The keys of all options, in the order of a text.
     pub fn keys() -> impl Iterator<Item = &'static str> {
         OPTIONS.iter().map(|option| option.key)

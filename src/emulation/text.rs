@@ -7,7 +7,7 @@ use pgs_interface::profile::{FLOAT, Profile};
 use thiserror::Error;
 
 use super::build::Build;
-use super::options::{OPTIONS, known, of_key, of_name};
+use super::options::{OPTIONS, of_key, of_name};
 
 /// A text that describes no build.
 #[derive(Debug, Clone, Error, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub enum BuildError {
         found: String,
     },
     /// A word of no option.
-    #[error("{found:?} is no option of a build: give one of {}", known())]
+    #[error("{found:?} is no option of a build: give one of {}", Build::words())]
     Word {
         /// The word, or the key.
         found: String,

@@ -4,6 +4,9 @@
 //! [`Body`] implement it, [`BodyArrays`] implements it over separate arrays, and an engine with a
 //! layout of its own implements its two methods: nothing is copied in between.
 
+use std::array;
+use std::ops::Sub;
+
 use bytemuck::{Pod, Zeroable};
 
 /// Position and orientation of a body, world frame.
@@ -167,22 +170,61 @@ impl<B: Bodies + ?Sized> Bodies for &mut B {
     }
 }
 
-/// Bodies kept in separate arrays of one length; a step refuses arrays of unequal lengths.
-#[derive(Debug)]
-pub struct BodyArrays<'a> {
-    /// Centres of mass, m.
-    pub positions: &'a mut [[f32; 3]],
-    /// Unit quaternions x, y, z, w.
-    pub orientations: &'a mut [[f32; 4]],
-    /// Linear velocities, m/s.
-    pub linear_velocities: &'a mut [[f32; 3]],
-    /// Angular velocities, rad/s.
-    pub angular_velocities: &'a mut [[f32; 3]],
-    /// Indices into the shape table.
-    pub shapes: &'a [u32],
+/// A number of the caller's arrays: `f32`, or `f64`, which the board gets rounded.
+pub trait Real: Copy + Default + Send + Sync + From<f32> + Sub<Output = Self> {
+    /// The nearest number that the board has.
+    fn single(self) -> f32;
+
+    /// An element of an array relative to `origin`.
+    fn relative<const N: usize>(given: [Self; N], origin: [Self; N]) -> [f32; N] {
+        array::from_fn(|i| (given[i] - origin[i]).single())
+    }
+
+    /// Stores a result that is relative to `origin`. A number that the step has not changed keeps
+    /// all its digits.
+    fn store<const N: usize>(kept: &mut [Self; N], results: [f32; N], origin: [Self; N]) {
+        for ((kept, result), origin) in kept.iter_mut().zip(results).zip(origin) {
+            if (*kept - origin).single().to_bits() != result.to_bits() {
+                // Not a sum: -0 plus 0 is 0.
+                *kept = Self::from(result) - (Self::default() - origin);
+            }
+        }
+    }
 }
 
-impl BodyArrays<'_> {
+impl Real for f32 {
+    fn single(self) -> f32 {
+        self
+    }
+}
+
+impl Real for f64 {
+    #[expect(clippy::cast_possible_truncation, reason = "the board computes with f32")]
+    fn single(self) -> f32 {
+        self as f32
+    }
+}
+
+/// Bodies kept in separate arrays of one length, of `f32` or of `f64`; a step refuses arrays of
+/// unequal lengths.
+#[derive(Debug)]
+pub struct BodyArrays<'a, R = f32> {
+    /// Centres of mass, m.
+    pub positions: &'a mut [[R; 3]],
+    /// Unit quaternions x, y, z, w.
+    pub orientations: &'a mut [[R; 4]],
+    /// Linear velocities, m/s.
+    pub linear_velocities: &'a mut [[R; 3]],
+    /// Angular velocities, rad/s.
+    pub angular_velocities: &'a mut [[R; 3]],
+    /// Indices into the shape table.
+    pub shapes: &'a [u32],
+    /// The place that the board takes for 0, m: near the bodies in a large world of `f64`. The
+    /// contact points are relative to it, too.
+    pub origin: [R; 3],
+}
+
+impl<R> BodyArrays<'_, R> {
     fn lengths(&self) -> [usize; 5] {
         [
             self.positions.len(),
@@ -194,7 +236,7 @@ impl BodyArrays<'_> {
     }
 }
 
-impl Bodies for BodyArrays<'_> {
+impl<R: Real> Bodies for BodyArrays<'_, R> {
     fn len(&self) -> usize {
         self.positions.len()
     }
@@ -205,19 +247,23 @@ impl Bodies for BodyArrays<'_> {
 
     fn body(&self, index: usize) -> Body {
         Body {
-            pose: Pose { position: self.positions[index], orientation: self.orientations[index] },
+            pose: Pose {
+                position: R::relative(self.positions[index], self.origin),
+                orientation: self.orientations[index].map(R::single),
+            },
             velocity: Velocity {
-                linear: self.linear_velocities[index],
-                angular: self.angular_velocities[index],
+                linear: self.linear_velocities[index].map(R::single),
+                angular: self.angular_velocities[index].map(R::single),
             },
             shape: self.shapes[index],
         }
     }
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
-        self.positions[index] = pose.position;
-        self.orientations[index] = pose.orientation;
-        self.linear_velocities[index] = velocity.linear;
-        self.angular_velocities[index] = velocity.angular;
+        let zero = [R::default(); 3];
+        R::store(&mut self.positions[index], pose.position, self.origin);
+        R::store(&mut self.orientations[index], pose.orientation, [R::default(); 4]);
+        R::store(&mut self.linear_velocities[index], velocity.linear, zero);
+        R::store(&mut self.angular_velocities[index], velocity.angular, zero);
     }
 }

@@ -11,7 +11,7 @@ mod shape;
 mod structures;
 mod tangents;
 
-pub use body::{Bodies, Body, BodyArrays, Pose, Velocity};
+pub use body::{Bodies, Body, BodyArrays, Pose, Real, Velocity};
 pub use collision::{CONTACT_POINTS, Collision, Contact};
 pub use collisions::{CollisionArrays, Collisions, WarmCollisions};
 pub use impulses::Impulses;

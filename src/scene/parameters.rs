@@ -112,7 +112,7 @@ pub struct StepParameters {
     pub angular_damping: f32,
     /// Share of the spin about the normal that every friction pass takes from both bodies of a
     /// collision, from 0 to 1, where one of them is static or lies on the other. 0 is off; 0.1 is
-    /// Bullet's.
+    /// [the thesis'](Self::thesis).
     pub spin_damping: f32,
     /// Gravity, m/s², world frame; only a step with integration uses it.
     pub gravity: [f32; 3],
@@ -186,7 +186,7 @@ impl Default for StepParameters {
             friction: 0.7,
             pair_friction: false,
             angular_damping: 0.99,
-            spin_damping: solver::SPIN_DAMPING,
+            spin_damping: 0.0,
             gravity: [0.0, -9.8, 0.0],
             contact_iterations: 4,
             friction_iterations: 4,
@@ -211,6 +211,13 @@ impl Default for StepParameters {
 /// assert_eq!(parameters.contact_iterations, 4, "the others stay");
 /// ```
 impl StepParameters {
+    /// The parameters of the thesis, which has them from Bullet's pipeline for graphics cards: the
+    /// default, with a spin damping of 10 %.
+    #[must_use]
+    pub fn thesis() -> Self {
+        Self { spin_damping: solver::SPIN_DAMPING, ..Self::default() }
+    }
+
     /// Sets the [time step](Self::time_step), s.
     #[must_use]
     pub const fn with_time_step(self, time_step: f32) -> Self {

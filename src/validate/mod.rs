@@ -488,6 +488,7 @@ pub(crate) mod tests {
                 linear_velocities: &mut linear_velocities,
                 angular_velocities: &mut angular_velocities,
                 shapes,
+                origin: [0.0; 3],
             };
             let collisions = CollisionArrays {
                 bodies: &[[0, 1]],

@@ -22,7 +22,7 @@ fn drop_a_pile() -> (Vec<StepReport>, Vec<Body>, Vec<usize>) {
     for _ in 0..60 {
         on_the_ground.push(scene::ground_pairs(scene.detect()));
         let (bodies, collisions) = scene.parts_mut();
-        let report = accelerator.step(bodies, collisions, &StepParameters::default());
+        let report = accelerator.step(bodies, collisions, &StepParameters::thesis());
         reports.push(report.expect("a step"));
     }
     assert_eq!(board.violations(), []);
@@ -87,7 +87,7 @@ fn the_unsupported_rim_of_a_pile_topples_and_nothing_gains_energy() {
     accelerator.set_shapes(scene.shapes()).expect("they fit");
     let start = scene.bodies().to_vec();
     let parameters =
-        StepParameters::default().with_contact_iterations(10).with_friction_iterations(10);
+        StepParameters::thesis().with_contact_iterations(10).with_friction_iterations(10);
 
     let mut energies = Vec::new();
     for _ in 0..600 {

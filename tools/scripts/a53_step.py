@@ -63,6 +63,7 @@ class Step:
     def __init__(self, title, work, step):
         self.title, self.work = title, work
         self.bodies, self.collisions, self.board = step["bodies"], step["collisions"], step["modelled_ms"]
+        self.passes = step["passes"]
         self.paper = step["host_on_a53_ms"]
 
     def milliseconds(self, groups, cores):
@@ -86,6 +87,13 @@ class Step:
             if abs(counted - paper) > max(counted / 10, whole / 100):
                 sys.exit(f"error: {self.title}: {name} takes {counted:.3f} ms on four cores by the count, {paper:.3f} ms "
                          "by tools/pgs/src/a53.rs: take the figure of the last table")
+
+    def compare_software(self):
+        """The same of the step in software, which has no part that is small beside another one."""
+        counted, paper = self.work["lanes"][1] / 4 / CLOCKS, self.paper["software"]
+        if abs(counted - paper) > counted / 10:
+            sys.exit(f"error: {self.title}: in software {counted:.3f} ms on four cores by the count, {paper:.3f} ms by "
+                     "tools/pgs/src/a53.rs: take the figures below the last table")
 
 
 def scene_step(pgs, plugin, title, arguments, steps):
@@ -123,6 +131,13 @@ def show(steps):
     print("|---|" + "---|" * len(parts))
     for step in steps:
         print(f"| {step.title} | " + " | ".join(f"{step.nanoseconds(name):,.1f}" for name in parts) + " |")
+    print()
+    for few, many in zip(steps, steps[2:]):
+        if few.passes < many.passes and few.collisions == many.collisions:
+            first, second = few.nanoseconds("lanes"), many.nanoseconds("lanes")
+            a_pass = (second - first) / (many.passes - few.passes)
+            print(f"{few.title}, {many.title}: in software {first - few.passes * a_pass:.1f} ns a collision and "
+                  f"{a_pass:.1f} ns a collision and pass, on one core")
 
 
 def hold(title, found, limit):
@@ -153,6 +168,8 @@ def main():
     show(steps)
     print()
     for step in steps:
+        if step.title.startswith(tuple(grids)):
+            step.compare_software()
         if step.title.startswith(tuple(grids)) and "10 + 10" not in step.title:
             step.compare()
         if step.title.startswith("10x10x10, 4"):

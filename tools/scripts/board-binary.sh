@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the static binary for the board by the README's two commands, and compares Bullet's vectors
+# Builds the static binary for the board by the two commands of docs/to-a-board.md, and compares Bullet's vectors
 # with it as a Cortex-A53, under user-mode QEMU.
 #
 # usage: board-binary.sh
@@ -12,10 +12,10 @@ need_packages qemu-user-static file
 
 readonly target=aarch64-unknown-linux-musl
 command -v rustup >/dev/null || skip "needs rustup, which brings the standard library for $target"
-grep -qx "rustup target add $target" README.md || fail "README.md does not show how to add $target"
+grep -qx "rustup target add $target" docs/to-a-board.md || fail "docs/to-a-board.md does not show how to add $target"
 attend timeout 300 rustup target add "$target" || skip "$target cannot be had here"
-build=$(sed -n "s/^\(cargo build --release --target $target\)$/\1/p" README.md | head -n 1)
-[ -n "$build" ] || fail "README.md does not show how to build for $target"
+build=$(sed -n "s/^\(cargo build --release --target $target\)$/\1/p" docs/to-a-board.md | head -n 1)
+[ -n "$build" ] || fail "docs/to-a-board.md does not show how to build for $target"
 CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUSTFLAGS=$(nameless_flags)
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUSTFLAGS
 # shellcheck disable=SC2086 # a command and its options

@@ -2,8 +2,9 @@
 # Opens the pages that pgs writes in a headless Chromium, uses them, and measures pictures a second. A page that
 # reports an error, stays uniform, ignores a control or asks the network for something fails it.
 #
-# usage: browser-test.sh                     two small scenes and the quick report, written for the test
-#        browser-test.sh KIND=PAGE.html...   these pages; kinds are the functions of browser/pages.js: report, view
+# usage: browser-test.sh                     a run while it steps, two small scenes, and the quick report
+#        browser-test.sh KIND=PAGE.html...   these pages; kinds are the functions of browser/pages.js: report, view,
+#                                            live (with the address of a run)
 #
 # Screenshots go to target/browser. Needs Node.js, npm and Chromium; installs chromium (Debian's package) where it
 # may, and fetches playwright-core with npm.
@@ -19,7 +20,10 @@ esac
 
 pages=()
 for page in "$@"; do
-	pages+=("${page%%=*}=$(realpath "${page#*=}")")
+	case $page in
+	live=*) pages+=("$page") ;;
+	*) pages+=("${page%%=*}=$(realpath "${page#*=}")") ;;
+	esac
 done
 cd "$repository"
 command -v node >/dev/null && command -v npm >/dev/null || need_packages nodejs npm
@@ -51,6 +55,17 @@ if [ ${#pages[@]} = 0 ]; then
 	SECONDS=0
 	attend "$pgs" thesis --all --out "$work/report" --quick --input "$input" > /dev/null
 	echo "thesis --all --quick: $SECONDS s"
-	pages=("view=$work/cubes.html" "view=$work/shapes.html" "report=$work/report/thesis.html")
+	rm -f "$work/live.pipe" && mkfifo "$work/live.pipe"
+	exec 3<> "$work/live.pipe"
+	begin "$pgs" run --scene shapes --grid 3x4x3 --beside-cold=false --steps 20000 --live 0 > "$work/live.txt" 2>&3
+	run=$!
+	read -r _ _ url <&3
+	pages=("live=$url" "view=$work/cubes.html" "view=$work/shapes.html" "report=$work/report/thesis.html")
 fi
 NODE_PATH=$work/node_modules attend node tools/scripts/browser/browser-test.js "$browser" "$work" "${pages[@]}"
+
+# The page is closed, and the run goes on to its last step.
+if [ -n "${run-}" ]; then
+	kill -0 "$run" 2>/dev/null && echo "live: the run goes on without the page"
+	await "$run" && grep ^digest "$work/live.txt" || fail "the run that was watched has failed"
+fi

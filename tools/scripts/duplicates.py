@@ -65,10 +65,6 @@ REASONS: dict[tuple[str, str], str] = {
     ("src/step/ordering.rs", "src/step/ordering.rs"): "two signatures: the order as asked for, and the cheapest",
     ("src/step/pack.rs", "src/step/written.rs"): "the fields of a packed step, from two sources",
     ("src/step/written.rs", "src/step/written.rs"): "a public function of the accelerator and of a step in flight",
-    (
-        "tools/pgs/src/verbs/run/mod.rs",
-        "tools/pgs/src/verbs/run/mod.rs",
-    ): "clap's words for an option that may stand without a value",
     ("tools/pgs/src/verbs/run/mod.rs", "tools/pgs/src/verbs/solve.rs"): "the groups of options that two verbs have",
     (
         "tools/rtlgen/src/equations/contact.rs",

@@ -69,7 +69,7 @@ simulators=("$folder/interlocked/pgs-rtl" "$folder/unchecked/pgs-rtl")
 if [ "$mode" = steps ]; then
 	if [ -n "${PGS_VECTORS-}" ]; then recorded+=("$PGS_VECTORS"/pile*/); fi
 	attend "$built/pgs" check --board emulated --accelerator "rtl:${simulators[0]}"
-	attend "$built/pgs" check --board emulated --inertia world --accelerator "rtl:$world"
+	attend "$built/pgs" check --board emulated:float,world --accelerator "rtl:$world"
 	attend "$built/pgs" faults --accelerator "rtl:${simulators[0]}"
 	for build in interlocked world; do
 		cosim=(--simulator "$folder/$build/pgs-rtl")
@@ -123,7 +123,7 @@ attend "$built/cosim" random --simulator "$folder/interlocked/pgs-rtl" --cases $
 attend "$built/cosim" full --simulator "$folder/interlocked/pgs-rtl" --gaps 300 --stalls 700
 attend "$built/pgs" solve tests/golden/two_cubes --compare --board emulated \
 	--accelerator "both:${simulators[0]}"
-attend "$built/pgs" solve tests/golden/pile5_step60 --profile half --board emulated \
+attend "$built/pgs" solve tests/golden/pile5_step60 --board emulated:half \
 	--accelerator "both:$folder/half-interlocked/pgs-rtl"
 # Impulses of each step come out, and go into the next one.
 attend "$built/pgs" run --grid 3x3x3 --drop 0 --steps 12 --warm-start --board emulated \

@@ -24,8 +24,8 @@ EXACT = ("digest", "hazards", "work_cycles")
 
 
 def pgs(program, verb, *options):
-    """The JSON document of a command on the emulated board, and its exit code."""
-    command = [program, *verb, "--board", "emulated", "--json", *options]
+    """The JSON document of a command on an emulated board, and its exit code."""
+    command = [program, *verb, "--json", *options]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
     if ran.returncode not in (0, 1):
         sys.exit(f"{' '.join(command)}: exit code {ran.returncode}\n{ran.stderr}")
@@ -62,7 +62,7 @@ def main():
         for hazards, simulator in (("interlocked", interlocked), ("unchecked", unchecked)):
             for bandwidth in ("12.8", "unlimited"):
                 verb = ["solve", folder]
-                options = ["--hazards", hazards, "--bandwidth", bandwidth]
+                options = ["--board", f"emulated:float,{hazards},bandwidth={bandwidth}"]
                 if hazards == "interlocked":
                     verb.append("--compare")
                 on_model = (*options, "--accelerator", "model")
@@ -75,7 +75,7 @@ def main():
                 result = f"differs from {model}: {', '.join(wrong)}" if wrong else "the model's"
                 print(f"{folder} {hazards} {bandwidth}: {hardware}: {result}", flush=True)
     for options in (["--order", "as-given"], ["--order", "auto"], ["--order", "auto", "--warm-start"]):
-        verb = ["run", "--grid", "5x5x5", "--steps", "60", *options]
+        verb = ["run", "--board", "emulated", "--grid", "5x5x5", "--steps", "60", *options]
         model = pgs(program, verb, "--accelerator", "model")[0]["digest"]["value"]
         hardware = pgs(program, verb, "--accelerator", f"rtl:{interlocked}")[0]["digest"]["value"]
         failed += model != hardware

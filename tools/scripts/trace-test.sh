@@ -57,8 +57,8 @@ read_files() {
 
 read_files one_cube solve tests/golden/one_cube
 read_files pile solve tests/golden/pile5_step60 --compare
-read_files half solve tests/golden/pile5_step60 --profile half
-read_files naive solve tests/golden/pile5_step60 --profile naive
-read_files small-descriptors solve tests/golden/pile5_step60 --length-width 10 --bandwidth 3
+read_files half solve tests/golden/pile5_step60 --board emulated:half
+read_files naive solve tests/golden/pile5_step60 --board emulated:naive
+read_files small-descriptors solve tests/golden/pile5_step60 --board emulated:float,length-width=10,bandwidth=3
 read_files run run --grid 3x3x3 --steps 20 --traced-step 12
 echo "the files of every step can be read"

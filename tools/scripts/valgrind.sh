@@ -39,10 +39,10 @@ check_c() {
 
 pgs=$target_root/release/pgs
 for profile in naive float half; do
-	check "$pgs" run --board emulated --profile "$profile" --grid 2x2x2 --steps 2 >/dev/null
+	check "$pgs" run --board "emulated:$profile" --grid 2x2x2 --steps 2 >/dev/null
 	echo "memcheck: nothing found in 2 steps on $profile"
 done
-check "$pgs" run --board emulated --scene shapes --inertia world --pair-friction --warm-start \
+check "$pgs" run --board emulated --scene shapes --pair-friction --warm-start \
 	--grid 2x2x2 --steps 2 >/dev/null
 echo "memcheck: nothing found in 2 steps with impulses"
 if command -v cc >/dev/null && command -v pkg-config >/dev/null; then

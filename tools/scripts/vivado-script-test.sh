@@ -105,7 +105,7 @@ for board in "${!largest[@]}"; do
 	refused "the default build on $board" "rtlgen generate ${largest[$board]} is the largest" tools/vivado/build.tcl -board "$board"
 	refused "world inertia on $board" "rtlgen generate ${world[$board]} is the largest" tools/vivado/build.tcl -board "$board" -rtl "$folder/world"
 	refused "half on $board" "rtlgen generate ${half[$board]} is the largest" tools/vivado/build.tcl -board "$board" -rtl "$folder/half"
-	grep -q -e "${largest[$board]}.*${world[$board]}.*${half[$board]}" docs/bitstream.md || fail "docs/bitstream.md has other builds for $board"
+	grep -q -e "${largest[$board]}.*${world[$board]}.*${half[$board]}" docs/to-a-board.md || fail "docs/to-a-board.md has other builds for $board"
 done
 generate high104 --memory 0x840000000+1G --bodies 4096 --collisions 16384
 refused "memory that the board does not have" "the zcu104 has no DDR_HIGH" tools/vivado/build.tcl -board zcu104 -rtl "$folder/high104"

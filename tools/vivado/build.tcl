@@ -3,7 +3,7 @@
 # THIS SCRIPT WAS NEVER RUN WITH VIVADO: none was at hand. tools/vivado/mock.tcl runs it in tclsh and checks
 # the structure of the block design. Its commands stand in UG835 of 2022.1 to 2024.1; no version was tried.
 # Names of parameters and pins of Vivado's IP come from their documentation and from public designs;
-# docs/bitstream.md lists what only Vivado can tell.
+# docs/to-a-board.md lists what only Vivado can tell.
 #
 #   vivado -mode batch -source tools/vivado/build.tcl -tclargs [OPTION VALUE]...
 #
@@ -118,7 +118,7 @@ proc build::check_board {name board} {
 	global pgs
 	variable blocks_beside
 	dict with board {
-		puts "board: $name, $part, $luts LUTs, $blocks blocks of RAM; docs/bitstream.md has the count of LUTs"
+		puts "board: $name, $part, $luts LUTs, $blocks blocks of RAM; docs/to-a-board.md has the count of LUTs"
 		if {$pgs(memory_segment) ni $ddr} {
 			error "the $name has no $pgs(memory_segment) in its preset: rtlgen generate --memory, below 2 GiB"
 		}
@@ -399,7 +399,7 @@ proc build::write_bif {out} {
 	puts $file "all: { \[destination_device = pl\] zynq-pgs.bit }"
 	close $file
 	puts "next: cd $out && bootgen -image zynq-pgs.bif -arch zynqmp -process_bitstream bin -w"
-	puts "which makes zynq-pgs.bit.bin; docs/bitstream.md goes on from there"
+	puts "which makes zynq-pgs.bit.bin; docs/to-a-board.md goes on from there"
 }
 
 # Everything. `here` is the folder of this script.
@@ -450,7 +450,7 @@ proc build::main {arguments here} {
 	puts "slack at $khz kHz: $setup ns setup, $hold ns hold; [file join $out timing.rpt]"
 	if {$until eq "route"} { return }
 	if {($setup < 0 || $hold < 0) && [dict get $options -negative-slack] eq "refuse"} {
-		error "the design misses its timing, and would miscalculate without a word; see docs/bitstream.md"
+		error "the design misses its timing, and would miscalculate without a word; see docs/to-a-board.md"
 	}
 
 	run_to_end impl_1 -to_step write_bitstream -jobs $jobs

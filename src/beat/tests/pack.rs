@@ -406,6 +406,7 @@ proptest! {
             linear_velocities: &mut linear,
             angular_velocities: &mut angular,
             shapes: &shapes,
+            origin: [0.0; 3],
         };
         let pairs: Vec<_> =
             list.iter().map(|collision| [collision.body_a, collision.body_b]).collect();

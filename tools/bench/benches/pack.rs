@@ -286,7 +286,7 @@ fn pack(
     ordered: &Ordered<'_, WarmCollisions<'_, Vec<Collision>>>,
 ) -> Result<Option<u32>, InputError> {
     let Step { bodies, collisions, shapes, .. } = step;
-    let with = (Some(ordered.schedule.empty()), &StepParameters::default());
+    let with = (Some(ordered.schedule.empty()), &StepParameters::thesis());
     match thing {
         Thing::Bodies => packer.pack(bodies, &[][..], shapes, (None, with.1)),
         Thing::AsGiven => packer.pack(bodies, collisions, shapes, (None, with.1)),

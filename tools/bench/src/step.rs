@@ -58,7 +58,7 @@ impl Step {
         let Pile { grid, drop, steps } = *pile;
         let mut scene = Scene::new(&SceneOptions { grid, drop })?;
         let mut accelerator = open(config, scene.shapes())?;
-        let parameters = StepParameters::default();
+        let parameters = StepParameters::thesis();
         let mut sent = parameters;
         sent.order = Some(Order::HazardFree);
         scene.detect();

@@ -143,9 +143,9 @@ typedef struct zpgs_parameters {
 
 // An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
 //
-// Address and stride are multiples of 4, and the stride is at least the size of an element. An
-// array of structures has the size of its structure as the stride, a dense array that of its
-// element. `data` may be null if the array has no element.
+// Address and stride are multiples of 4, or of 8 for doubles, and the stride is at least the size
+// of an element. An array of structures has the size of its structure as the stride, a dense array
+// that of its element. `data` may be null if the array has no element.
 typedef struct zpgs_strided {
     // The first element.
     void *data;
@@ -183,6 +183,17 @@ typedef struct zpgs_bodies {
     struct zpgs_strided angular_velocities;
     // Indices into the shapes: `uint32_t`.
     struct zpgs_strided_const shapes;
+    // The shapes of this world, a dense array: the step loads them where the accelerator has
+    // others, so that worlds with shapes of their own share it.
+    const struct zpgs_shape *table;
+    // Number of these shapes. 0: the step takes the shapes that the accelerator has.
+    size_t table_count;
+    // Bytes of a number in the arrays above: 4 or 0 for `float`, 8 for `double`, which the board
+    // gets rounded. A number that a step has not changed keeps all its digits.
+    size_t number_size;
+    // The place that the board takes for 0, m: near the bodies in a large world of doubles. The
+    // contact points are relative to it, too.
+    double origin[3];
 } zpgs_bodies;
 
 // Where a collision was in the last step of its world.
@@ -331,8 +342,8 @@ enum zpgs_status zpgs_set_shapes(struct zpgs_accelerator *accelerator,
                                  const struct zpgs_shape *shapes,
                                  size_t count);
 
-// Fills in the parameters of a step: Bullet's, at 60 steps a second. `size` is
-// `sizeof(zpgs_parameters)`.
+// Fills in the parameters of a step: Bullet's at 60 steps a second, without damping of spin.
+// `size` is `sizeof(zpgs_parameters)`.
 //
 // # Safety
 // `parameters` is null or the address of `size` bytes that no other thread uses during the call.

@@ -4,12 +4,13 @@
 use std::ffi::c_void;
 
 use crate::collision::Place;
+use crate::shape::Shape;
 
 /// An array that the library reads and writes: element `i` lies `i * stride` bytes behind `data`.
 ///
-/// Address and stride are multiples of 4, and the stride is at least the size of an element. An
-/// array of structures has the size of its structure as the stride, a dense array that of its
-/// element. `data` may be null if the array has no element.
+/// Address and stride are multiples of 4, or of 8 for doubles, and the stride is at least the size
+/// of an element. An array of structures has the size of its structure as the stride, a dense array
+/// that of its element. `data` may be null if the array has no element.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Strided {
@@ -53,6 +54,37 @@ pub struct BodyArrays {
     pub angular_velocities: Strided,
     /// Indices into the shapes: `uint32_t`.
     pub shapes: StridedConst,
+    /// The shapes of this world, a dense array: the step loads them where the accelerator has
+    /// others, so that worlds with shapes of their own share it.
+    pub table: *const Shape,
+    /// Number of these shapes. 0: the step takes the shapes that the accelerator has.
+    pub table_count: usize,
+    /// Bytes of a number in the arrays above: 4 or 0 for `float`, 8 for `double`, which the board
+    /// gets rounded. A number that a step has not changed keeps all its digits.
+    pub number_size: usize,
+    /// The place that the board takes for 0, m: near the bodies in a large world of doubles. The
+    /// contact points are relative to it, too.
+    pub origin: [f64; 3],
+}
+
+impl Default for BodyArrays {
+    /// No bodies.
+    fn default() -> Self {
+        let none = Strided { data: std::ptr::null_mut(), stride: 0 };
+        Self {
+            size: size_of::<Self>(),
+            count: 0,
+            positions: none,
+            orientations: none,
+            linear_velocities: none,
+            angular_velocities: none,
+            shapes: StridedConst { data: std::ptr::null(), stride: 0 },
+            table: std::ptr::null(),
+            table_count: 0,
+            number_size: 0,
+            origin: [0.0; 3],
+        }
+    }
 }
 
 /// The collisions of a step, in the caller's own memory.

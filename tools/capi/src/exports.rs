@@ -16,7 +16,7 @@ use crate::collision::{Collision, Impulses, count_with_friction};
 use crate::failure::Failure;
 use crate::handle::{AcceleratorHandle, State};
 use crate::last_error;
-use crate::memory::{self, BodiesView, CollisionsView, Out, Span};
+use crate::memory::{self, BodiesView, CollisionsView, Out, Span, span};
 use crate::parameters::Parameters;
 use crate::report::Report;
 use crate::shape::Shape;
@@ -120,20 +120,12 @@ pub unsafe extern "C" fn zpgs_set_shapes(
     call_with(handle, |state| {
         // SAFETY: `shapes` is null or leads to `count` initialised shapes that no thread writes
         // during the call; a shape takes every bit pattern.
-        let given = unsafe { memory::slice(shapes, count, "shapes") }?;
-        let mut shapes = Vec::new();
-        shapes.try_reserve_exact(given.len()).map_err(|error| {
-            Failure::argument(format!(
-                "no memory for {count} shapes ({error}): correct their number"
-            ))
-        })?;
-        shapes.extend(given.iter().map(|shape| zynq_pgs::Shape::from(*shape)));
-        Ok(state.idle()?.set_shapes(&shapes)?)
+        state.set_shapes(unsafe { memory::slice(shapes, count, "shapes") }?)
     })
 }
 
-/// Fills in the parameters of a step: Bullet's, at 60 steps a second. `size` is
-/// `sizeof(zpgs_parameters)`.
+/// Fills in the parameters of a step: Bullet's at 60 steps a second, without damping of spin.
+/// `size` is `sizeof(zpgs_parameters)`.
 ///
 /// # Safety
 /// `parameters` is null or the address of `size` bytes that no other thread uses during the call.
@@ -179,19 +171,20 @@ pub unsafe extern "C" fn zpgs_step(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        let structures = [
-            Span::of("zpgs_bodies", bodies),
-            Span::of("zpgs_collisions", collisions),
-            Span::of("zpgs_parameters", parameters),
-        ];
         // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
         // call; this call alone uses the bodies, and no thread writes the others.
+        let structure = unsafe { span(bodies) };
+        // SAFETY: as above.
+        let structures = [structure, unsafe { span(collisions) }];
+        // SAFETY: as above.
+        let structures = structures.into_iter().chain([unsafe { span(parameters) }]);
+        // SAFETY: as above.
         let (mut bodies, collisions, parameters) =
             unsafe { read_input(bodies, collisions, parameters) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
-        let inputs = structures.into_iter().chain(collisions.inputs());
+        let inputs = structures.chain(collisions.inputs());
         outputs_apart(&bodies, report.as_ref(), None, inputs)?;
         let done = state.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
@@ -234,9 +227,10 @@ pub unsafe extern "C" fn zpgs_wait(
     // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     call_with(handle, |state| {
-        let structure = [Span::of("zpgs_bodies", bodies)];
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
+        let structure = [unsafe { span(bodies) }];
+        // SAFETY: as above.
         let mut bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.
@@ -340,7 +334,7 @@ pub unsafe extern "C" fn zpgs_cancel(accelerator: *const AcceleratorHandle) -> S
 /// Refuses a call whose outputs, the bodies among them, share bytes with each other or with its
 /// input.
 pub(crate) fn outputs_apart(
-    bodies: &BodiesView,
+    bodies: &BodiesView<'_>,
     report: Option<&Out<Report>>,
     started: Option<Span>,
     inputs: impl Iterator<Item = Span> + Clone,
@@ -349,7 +343,7 @@ pub(crate) fn outputs_apart(
     let [positions, orientations, linear, angular] = bodies.outputs();
     let report = report.map_or(none, Out::span);
     let outputs = [positions, orientations, linear, angular, report, started.unwrap_or(none)];
-    memory::refuse_overlap(&outputs, inputs.chain([bodies.input()]))
+    memory::refuse_overlap(&outputs, inputs.chain(bodies.inputs()))
 }
 
 /// Refuses a warm start whose impulses are all 0, which would be a cold one that takes longer.
@@ -383,7 +377,12 @@ pub(crate) unsafe fn with_input<'a>(
     bodies: *const BodyArrays,
     collisions: *const CollisionArray,
     parameters: *const Parameters,
-    act: fn(&mut State, &BodiesView, &CollisionsView<'a>, &StepParameters) -> Result<(), Failure>,
+    act: fn(
+        &mut State,
+        &BodiesView<'a>,
+        &CollisionsView<'a>,
+        &StepParameters,
+    ) -> Result<(), Failure>,
 ) -> Status {
     // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
     // returns: `# Safety` of this function.
@@ -406,7 +405,7 @@ pub(crate) unsafe fn read_input<'a>(
     bodies: *const BodyArrays,
     collisions: *const CollisionArray,
     parameters: *const Parameters,
-) -> Result<(BodiesView, CollisionsView<'a>, StepParameters), Failure> {
+) -> Result<(BodiesView<'a>, CollisionsView<'a>, StepParameters), Failure> {
     // SAFETY: the pointer is null or leads to the structure, whose arrays are as it describes:
     // `# Safety` of this function.
     let bodies = unsafe { read_bodies(bodies) }?;
@@ -435,19 +434,11 @@ pub(crate) unsafe fn read_parameters(
 ///
 /// # Safety
 /// The pointer is null or leads to the structure, whose arrays are as it describes.
-pub(crate) unsafe fn read_bodies(pointer: *const BodyArrays) -> Result<BodiesView, Failure> {
-    const NONE: Strided = Strided { data: std::ptr::null_mut(), stride: 0 };
-    let nothing = BodyArrays {
-        size: 0,
-        count: 0,
-        positions: NONE,
-        orientations: NONE,
-        linear_velocities: NONE,
-        angular_velocities: NONE,
-        shapes: StridedConst { data: std::ptr::null(), stride: 0 },
-    };
+pub(crate) unsafe fn read_bodies<'a>(
+    pointer: *const BodyArrays,
+) -> Result<BodiesView<'a>, Failure> {
     // SAFETY: the pointer is null or leads to the structure: `# Safety` of this function.
-    let arrays = unsafe { memory::read(pointer, nothing) }?;
+    let arrays = unsafe { memory::read(pointer, BodyArrays::default()) }?;
     // SAFETY: the arrays are as the structure describes: `# Safety` of this function.
     unsafe { BodiesView::new(arrays) }
 }

@@ -6,7 +6,7 @@ use crate::arrays::{BodyArrays, CollisionArray};
 use crate::barrier::call_with;
 use crate::exports::{outputs_apart, read_bodies, with_input};
 use crate::handle::{AcceleratorHandle, State};
-use crate::memory::{self, Out, Span};
+use crate::memory::{self, Out, Span, span};
 use crate::parameters::Parameters;
 use crate::report::Report;
 use crate::status::Status;
@@ -54,9 +54,10 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
     let handle = unsafe { memory::handle(accelerator) };
     let mut start_failed = None;
     let status = call_with(handle, |state| {
-        let structure = [Span::of("zpgs_bodies", bodies)];
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
+        let structure = [unsafe { span(bodies) }];
+        // SAFETY: as above.
         let bodies = unsafe { read_bodies(bodies) };
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.

@@ -6,14 +6,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use pgs_support::Process;
 use zynq_pgs::{
-    Accelerator, BoardChoice, Bodies, Cancellation, Collisions, Detached, Error, Impulses,
-    LastStep, OpenOptions, Prepared, StepParameters, StepReport,
+    Accelerator, BoardChoice, Cancellation, Collisions, Detached, Error, Impulses, LastStep,
+    OpenOptions, Prepared, StepParameters, StepReport,
 };
 
 use crate::failure::Failure;
 use crate::last_error::{self, c_string};
-use crate::memory::CollisionsView;
+use crate::memory::{BodiesView, CollisionsView};
 use crate::pushed::{List, Pushed};
+use crate::shape::Shape;
 use crate::status::Status;
 
 /// An open accelerator: `zpgs_open` makes it, `zpgs_close` ends it.
@@ -37,6 +38,8 @@ pub(crate) struct State {
     ticket: Option<Detached>,
     prepared: Option<Prepared>,
     pushed: Pushed,
+    /// The shapes that the accelerator has.
+    shapes: Vec<Shape>,
     /// The last step of each world.
     last_steps: BTreeMap<u32, LastStep>,
 }
@@ -48,9 +51,14 @@ impl AcceleratorHandle {
         let mut accelerator = Accelerator::open(OpenOptions { board, ..OpenOptions::default() })?;
         let cancellation = Cancellation::new();
         accelerator.set_cancellation(cancellation.clone());
-        let (ticket, prepared, pushed) = (None, None, Pushed::default());
-        let last_steps = BTreeMap::new();
-        let state = Mutex::new(State { accelerator, ticket, prepared, pushed, last_steps });
+        let state = Mutex::new(State {
+            accelerator,
+            ticket: None,
+            prepared: None,
+            pushed: Pushed::default(),
+            shapes: Vec::new(),
+            last_steps: BTreeMap::new(),
+        });
         Ok(Self { state, cancellation, text: Mutex::default(), process: Process::this() })
     }
 
@@ -114,14 +122,44 @@ impl State {
         }
     }
 
+    /// Loads shapes, in place of all earlier ones.
+    pub(crate) fn set_shapes(&mut self, shapes: &[Shape]) -> Result<(), Failure> {
+        let accelerator = self.idle()?;
+        let (mut drivers, mut kept) = (Vec::new(), Vec::new());
+        let room = drivers.try_reserve_exact(shapes.len());
+        room.and_then(|()| kept.try_reserve_exact(shapes.len())).map_err(|error| {
+            let count = shapes.len();
+            Failure::argument(format!("no memory for {count} shapes ({error}): correct the number"))
+        })?;
+        drivers.extend(shapes.iter().map(|shape| zynq_pgs::Shape::from(*shape)));
+        accelerator.set_shapes(&drivers)?;
+        kept.extend_from_slice(shapes);
+        self.shapes = kept;
+        Ok(())
+    }
+
+    /// Loads the shapes of a world where the accelerator has others.
+    fn load_shapes(&mut self, bodies: &BodiesView<'_>) -> Result<(), Failure> {
+        match bodies.table {
+            None => Ok(()),
+            Some(table) if table == self.shapes => Ok(()),
+            Some(_) if self.ticket.is_some() => Err(Failure::sequence(
+                "a step with other shapes is in flight: give the worlds one table of all shapes, \
+                 or call zpgs_wait first",
+            )),
+            Some(table) => self.set_shapes(table),
+        }
+    }
+
     /// Takes a step.
     pub(crate) fn step(
         &mut self,
-        bodies: &mut impl Bodies,
+        bodies: &mut BodiesView<'_>,
         collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<StepReport, Failure> {
         self.idle()?;
+        self.load_shapes(bodies)?;
         let Self { accelerator, last_steps, .. } = self;
         placed(last_steps, collisions, |all| Ok(accelerator.step(bodies, all, parameters)?))
     }
@@ -129,11 +167,12 @@ impl State {
     /// Starts a step and keeps its ticket.
     pub(crate) fn submit(
         &mut self,
-        bodies: &impl Bodies,
+        bodies: &BodiesView<'_>,
         collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
         self.idle()?;
+        self.load_shapes(bodies)?;
         let Self { accelerator, last_steps, ticket, .. } = self;
         placed(last_steps, collisions, |all| {
             *ticket = Some(accelerator.submit(bodies, all, parameters)?.detach());
@@ -160,10 +199,11 @@ impl State {
     /// Submits the step of the list, and ends the list.
     pub(crate) fn submit_pushed(
         &mut self,
-        bodies: &impl Bodies,
+        bodies: &BodiesView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
         self.idle()?;
+        self.load_shapes(bodies)?;
         let accelerator = &mut self.accelerator;
         let step = match self.pushed.all(parameters.warm_start)? {
             List::Cold(collisions) => accelerator.submit(bodies, collisions, parameters),
@@ -183,10 +223,11 @@ impl State {
     /// Packs another step while one is in flight.
     pub(crate) fn prepare(
         &mut self,
-        bodies: &impl Bodies,
+        bodies: &BodiesView<'_>,
         collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
+        self.load_shapes(bodies)?;
         let ticket = self.ticket()?;
         self.prepared = None;
         let mut step = self.accelerator.attach(ticket)?;
@@ -202,7 +243,7 @@ impl State {
     #[expect(clippy::type_complexity, reason = "two outcomes, or neither")]
     pub(crate) fn wait_and_start(
         &mut self,
-        bodies: &mut impl Bodies,
+        bodies: &mut BodiesView<'_>,
     ) -> Result<(Result<StepReport, Failure>, Result<(), Failure>), Failure> {
         let prepared = prepared(&self.prepared)?;
         let none = || Failure::sequence("no step is in flight: call zpgs_start");
@@ -226,7 +267,7 @@ impl State {
     }
 
     /// Ends the step in flight.
-    pub(crate) fn wait(&mut self, bodies: &mut impl Bodies) -> Result<StepReport, Failure> {
+    pub(crate) fn wait(&mut self, bodies: &mut BodiesView<'_>) -> Result<StepReport, Failure> {
         let ticket = self.ticket()?;
         Ok(self.accelerator.attach(ticket)?.wait(bodies)?)
     }

@@ -1,4 +1,4 @@
-// Platforms, bounces, meshes, sleep and speed.
+// Platforms, bounces, meshes and speed.
 #include "table.h"
 
 namespace {
@@ -107,24 +107,6 @@ void mesh(Table &table) {
     table.add(both, 0, "bodies that fell through, of 120", "", within(0, 0));
     table.add(both, 1, "deepest at step 300", "mm");
     table.add(both, 2, "kinetic energy at step 300", "J");
-}
-
-void sleeping(Table &table) {
-    const auto both = table.measure(10, [](World &world) -> std::vector<double> {
-        world.addGround();
-        for (int i = 0; i < 125; i++) {
-            const float y = 0.55f + 1.1f * float(i / 25);
-            world.add(world.cube(), 1, btVector3(1.3f * float(i % 5), y, 1.3f * float(i / 5 % 5)));
-        }
-        world.step(900);
-        const double asleep = world.asleep();
-        btRigidBody *ball = world.add(world.shape<btSphereShape>(0.5f), 5, btVector3(2.6f, 9, 2.6f));
-        ball->setLinearVelocity(btVector3(0, -10, 0));
-        world.step(60);
-        return {asleep, double(world.asleep())};
-    });
-    table.add(both, 0, "asleep after 15 s, of 125 cubes", "", within(125, 125));
-    table.add(both, 1, "still asleep 1 s after a ball fell on them", "", atMost(124));
 }
 
 void ccd(Table &table) {

@@ -123,35 +123,6 @@ void wall(Table &table) {
     table.add(both, 2, "bricks that fell by then, of 80", "");
 }
 
-void mixed(Table &table) {
-    const auto both = table.measure(10, [](World &world) -> std::vector<double> {
-        world.addGround();
-        std::vector<btCollisionShape *> shapes;
-        for (const float size : {0.3f, 0.4f, 0.5f}) {
-            shapes.push_back(world.shape<btSphereShape>(size));
-            shapes.push_back(world.shape<btCapsuleShape>(0.6f * size, size));
-            shapes.push_back(world.shape<btBoxShape>(btVector3(size, 0.5f * size, 0.8f * size)));
-            shapes.push_back(world.shape<btCylinderShape>(btVector3(0.7f * size, size, 0.7f * size)));
-        }
-        const float masses[] = {0.5f, 1, 2, 4};
-        std::mt19937 random(2);
-        std::uniform_real_distribution<float> shift(-0.2f, 0.2f);
-        for (size_t i = 0; i < 288; i++) {
-            const float atX = 1.3f * float(i / 6 % 6) - 4 + shift(random);
-            const float atZ = 1.3f * float(i % 6) - 4 + shift(random);
-            world.add(shapes[i % 12], masses[i / 12 % 4], btVector3(atX, 1 + 1.3f * float(i / 36), atZ));
-        }
-        world.step(400);
-        double lowest = 0;
-        for (const auto &body : world.bodies())
-            if (body->getInvMass() > 0) lowest = std::fmin(lowest, place(body.get()).y());
-        return {world.kineticEnergy(), world.deepest(), lowest};
-    });
-    table.add(both, 0, "kinetic energy at step 400", "J");
-    table.add(both, 1, "deepest at step 400", "mm");
-    table.add(both, 2, "lowest centre below the ground", "m", atLeast(-0.05));
-}
-
 void tower(Table &table) {
     double highest[2] = {0, 0};
     bool stands[2] = {true, true};

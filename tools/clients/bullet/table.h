@@ -83,9 +83,10 @@ struct Scene {
 const std::vector<Scene> &scenes();
 
 // In scenes_*.cpp.
-void pile(Table &), wall(Table &), mixed(Table &), tower(Table &), ratio(Table &), spread(Table &);
+void pile(Table &), wall(Table &), tower(Table &), ratio(Table &), spread(Table &);
 void ramp(Table &), groove(Table &), spin(Table &);
-void platform(Table &), restitution(Table &), mesh(Table &), sleeping(Table &), ccd(Table &);
-void joints(Table &), masses(Table &);
-void drop(Table &), deep(Table &), rolling(Table &), soft(Table &), properties(Table &);
+void platform(Table &), restitution(Table &), mesh(Table &), ccd(Table &);
+void basic(Table &), compound(Table &), pyramids(Table &), heightfield(Table &);
+void ragdolls(Table &), masses(Table &), worlds(Table &);
+void drop(Table &), deep(Table &), rolling(Table &), rollers(Table &), soft(Table &), properties(Table &);
 void warmth(Table &), timing(Table &);

@@ -16,6 +16,11 @@ World::World(const std::string &board, const ZynqPgsOptions &options, int iterat
     }
 }
 
+World::World(std::shared_ptr<ZynqPgsBoard> board, const ZynqPgsOptions &options, int iterations)
+    : m_board(new ZynqPgsSolver(std::move(board), options)) {
+    build(m_board.get(), iterations);
+}
+
 World::World(btConstraintSolver &solver, int iterations) { build(&solver, iterations); }
 
 void World::build(btConstraintSolver *solver, int iterations) {

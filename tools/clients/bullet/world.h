@@ -45,6 +45,8 @@ class World {
 public:
     // `board` empty: Bullet's own solver.
     World(const std::string &board, const ZynqPgsOptions &options, int iterations);
+    // On a board that it shares with other worlds.
+    World(std::shared_ptr<ZynqPgsBoard> board, const ZynqPgsOptions &options, int iterations);
     // On a solver of the caller's, which outlives the world.
     World(btConstraintSolver &solver, int iterations);
     ~World();

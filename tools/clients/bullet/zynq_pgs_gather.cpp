@@ -139,7 +139,6 @@ void ZynqPgsGather::clear() {
 void ZynqPgsGather::clearShapes() {
     m_shapes.clear();
     m_shapeIndices.clear();
-    m_shapesVersion++;
 }
 
 void ZynqPgsGather::take(btCollisionObject **bodies, int numBodies, btPersistentManifold **manifolds,
@@ -300,7 +299,6 @@ uint32_t ZynqPgsGather::shapeOf(btScalar inverseMass, const btVector3 &inverseIn
         return STATIC_SHAPE;
     }
     m_shapes.push_back(shape);
-    m_shapesVersion++;
     return m_shapeIndices[key] = uint32_t(m_shapes.size() - 1);
 }
 

@@ -67,8 +67,6 @@ public:
     // True if a kinematic body in a collision moves.
     bool hasKinematic() const { return m_hasKinematic; }
     const std::vector<zpgs_shape> &shapes() const { return m_shapes; }
-    // Another number for another table of shapes.
-    uint64_t shapesVersion() const { return m_shapesVersion; }
     // Forgets the shapes, as after the board has refused them.
     void clearShapes();
 
@@ -108,7 +106,6 @@ private:
     // The table stays from step to step, so that the board seldom gets a new one.
     std::vector<zpgs_shape> m_shapes;
     std::map<std::array<float, 4>, uint32_t> m_shapeIndices;
-    uint64_t m_shapesVersion = 0;
     bool m_tooManyShapes = false;
     // Whether the table was empty when the gathering began: it may then grow beyond SHAPES.
     bool m_fresh = true;

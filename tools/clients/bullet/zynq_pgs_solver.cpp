@@ -20,20 +20,25 @@ zpgs_strided column(float *field) { return {field, sizeof(ZynqPgsGather::Body)};
 
 }  // namespace
 
-ZynqPgsSolver::ZynqPgsSolver(const char *board, const ZynqPgsOptions &options)
-    : m_boardText(board), m_options(options), m_gather(options.pointsPerCollision, options.deepShare) {
-    // Without a callback Bullet leaves the data of a removed point in its slot, where it expects none later.
-    if (options.byPlace && !gContactDestroyedCallback) gContactDestroyedCallback = forget;
-    open();
+void ZynqPgsBoard::open() {
+    zpgs_close(accelerator);
+    reopen = false;
+    openings++;
+    error = zpgs_open(text.c_str(), &accelerator) == ZPGS_STATUS_OK ? "" : zpgs_last_error(nullptr);
 }
 
-ZynqPgsSolver::~ZynqPgsSolver() { zpgs_close(m_board); }
+ZynqPgsSolver::ZynqPgsSolver(std::shared_ptr<ZynqPgsBoard> board, const ZynqPgsOptions &options)
+    : m_board(std::move(board)),
+      m_world(m_board->worlds++),
+      m_options(options),
+      m_gather(options.pointsPerCollision, options.deepShare) {
+    // Without a callback Bullet leaves the data of a removed point in its slot, where it expects none later.
+    if (options.byPlace && !gContactDestroyedCallback) gContactDestroyedCallback = forget;
+    if (!isOpen()) say(m_board->error);
+}
 
-bool ZynqPgsSolver::open() {
-    m_hasShapes = false;
-    m_gather.forgetPlaces();
-    m_boardImpulses = Impulses::Unknown;
-    return !failed(zpgs_open(m_boardText.c_str(), &m_board));
+ZynqPgsSolver::~ZynqPgsSolver() {
+    if (isOpen()) zpgs_forget(m_board->accelerator, m_world);
 }
 
 void ZynqPgsSolver::prepareSolve(int bodies, int manifolds) {
@@ -92,16 +97,6 @@ void ZynqPgsSolver::allSolved(const btContactSolverInfo &info, btIDebugDraw *deb
     m_gather.clear();
 }
 
-bool ZynqPgsSolver::loadShapes() {
-    if (m_hasShapes && m_shapesVersion == m_gather.shapesVersion()) return true;
-    const std::vector<zpgs_shape> &shapes = m_gather.shapes();
-    m_hasShapes = !failed(zpgs_set_shapes(m_board, shapes.data(), shapes.size()));
-    m_shapesVersion = m_gather.shapesVersion();
-    // Otherwise later steps would bring the refused shapes again, although they need few of them.
-    if (!m_hasShapes) m_gather.clearShapes();
-    return m_hasShapes;
-}
-
 void ZynqPgsSolver::setParameters(const btContactSolverInfo &info, zpgs_parameters &parameters) const {
     const int world = info.m_numIterations;
     const int contact = m_options.contactIterations > 0 ? m_options.contactIterations : world;
@@ -127,11 +122,16 @@ void ZynqPgsSolver::setParameters(const btContactSolverInfo &info, zpgs_paramete
 
 // False if the board did not solve the step. Bullet's bodies and points are then as before.
 bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
-    if (m_reopen) {
-        m_reopen = false;
-        open();
+    if (m_board->reopen) {
+        m_board->open();
+        if (!isOpen()) say(m_board->error);
     }
-    if (!m_board || !loadShapes()) return false;
+    if (!isOpen()) return false;
+    if (m_opening != m_board->openings) {
+        m_opening = m_board->openings;
+        m_gather.forgetPlaces();
+        m_boardImpulses = Impulses::Unknown;
+    }
 
     zpgs_parameters parameters;
     if (failed(zpgs_parameters_default(&parameters, sizeof parameters))) return false;
@@ -147,6 +147,8 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     bodies.linear_velocities = column(first.linearVelocity);
     bodies.angular_velocities = column(first.angularVelocity);
     bodies.shapes = {&first.shape, sizeof first};
+    bodies.table = m_gather.shapes().data();
+    bodies.table_count = m_gather.shapes().size();
 
     // A pass favours its last collisions; the same ones in every step let a tower lean.
     const int every = m_options.reverseEvery;
@@ -165,6 +167,7 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     collisions.collisions = {pairs.data(), sizeof pairs[0]};
     if (m_options.byPlace) {
         collisions.places = m_gather.places().data();
+        collisions.world = m_world;
         collisions.factor = float(info.m_warmstartingFactor);
     } else {
         collisions.impulses = {m_gather.impulses().data(), sizeof(zpgs_impulses)};
@@ -178,7 +181,8 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     if (!parameters.impulses_out)
         impulses.assign(pairs.size(), zpgs_impulses());
     else if (status == ZPGS_STATUS_OK)
-        status = zpgs_read_impulses(m_board, {impulses.data(), sizeof impulses[0]}, impulses.size());
+        status = zpgs_read_impulses(m_board->accelerator, {impulses.data(), sizeof impulses[0]},
+                                    impulses.size());
     zpgs_report pushReport = {};
     pushReport.size = sizeof pushReport;
     const bool pushes = m_gather.isDeep();
@@ -186,8 +190,12 @@ bool ZynqPgsSolver::stepBoard(const btContactSolverInfo &info) {
     m_counts.librarySeconds += double(std::clock() - start) / CLOCKS_PER_SEC;
     // The last thing that can fail: of a step that fails the library keeps nothing.
     const bool commits = m_options.byPlace && parameters.impulses_out && status == ZPGS_STATUS_OK;
-    if (commits) status = zpgs_commit(m_board, &collisions);
-    if (failed(status)) return false;
+    if (commits) status = zpgs_commit(m_board->accelerator, &collisions);
+    if (failed(status)) {
+        // Otherwise later steps would bring shapes that were refused again, although they need few of them.
+        if (status == ZPGS_STATUS_INPUT) m_gather.clearShapes();
+        return false;
+    }
     if (commits) m_gather.storePlaces();
     m_counts.boardSteps++;
     m_counts.pushSteps += pushes;
@@ -219,7 +227,7 @@ void ZynqPgsSolver::loadImpulses(const btContactSolverInfo &info, zpgs_parameter
 zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions, zpgs_parameters &parameters,
                                 zpgs_report &report) {
     const bool asked = parameters.impulses_out != 0;
-    const zpgs_status status = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    const zpgs_status status = zpgs_step(m_board->accelerator, &bodies, &collisions, &parameters, &report);
     if (status == ZPGS_STATUS_OK && asked) m_boardImpulses = Impulses::Has;
     if (status != ZPGS_STATUS_INPUT || !asked || m_boardImpulses == Impulses::Has) return status;
 
@@ -227,7 +235,7 @@ zpgs_status ZynqPgsSolver::step(zpgs_bodies &bodies, zpgs_collisions &collisions
     for (const bool out : {true, false}) {
         parameters.warm_start = 0;
         parameters.impulses_out = out;
-        const zpgs_status cold = zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+        const zpgs_status cold = zpgs_step(m_board->accelerator, &bodies, &collisions, &parameters, &report);
         if (cold == ZPGS_STATUS_INPUT && out) continue;
         if (cold == ZPGS_STATUS_OK) m_boardImpulses = out ? Impulses::Has : Impulses::Lacks;
         return cold;
@@ -251,7 +259,7 @@ zpgs_status ZynqPgsSolver::push(const btContactSolverInfo &info, zpgs_bodies bod
     parameters.kinematic = 0;
     parameters.warm_start = 0;
     parameters.impulses_out = 0;
-    return zpgs_step(m_board, &bodies, &collisions, &parameters, &report);
+    return zpgs_step(m_board->accelerator, &bodies, &collisions, &parameters, &report);
 }
 
 void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) {
@@ -264,16 +272,12 @@ void ZynqPgsSolver::fallBack(const btContactSolverInfo &info, btIDebugDraw *debu
                                                     m_dispatcher);
 }
 
-// Also where no board is open: the error is then the thread's.
 bool ZynqPgsSolver::failed(zpgs_status status) {
     if (status == ZPGS_STATUS_OK) return false;
-    const std::string own = m_board ? zpgs_last_error(m_board) : "";
+    const std::string own = zpgs_last_error(m_board->accelerator);
     say(own.empty() ? zpgs_last_error(nullptr) : own);
-    if (status == ZPGS_STATUS_REOPEN || status == ZPGS_STATUS_PANIC) {
-        zpgs_close(m_board);
-        m_board = nullptr;
-        m_reopen = true;  // by the next step, once
-    }
+    // By the next step on it, once.
+    m_board->reopen |= status == ZPGS_STATUS_REOPEN || status == ZPGS_STATUS_PANIC;
     return true;
 }
 

@@ -13,6 +13,7 @@
 #include <zynq_pgs.h>
 
 #include <cstdint>
+#include <memory>
 #include <set>
 #include <string>
 
@@ -50,6 +51,24 @@ struct ZynqPgsOptions {
     uint32_t retries = 1;
 };
 
+// An open board. Solvers of several worlds may share one, in one thread; each brings its shapes to its steps.
+struct ZynqPgsBoard {
+    explicit ZynqPgsBoard(const char *board) : text(board) { open(); }
+    ~ZynqPgsBoard() { zpgs_close(accelerator); }
+    ZynqPgsBoard(const ZynqPgsBoard &) = delete;
+    ZynqPgsBoard &operator=(const ZynqPgsBoard &) = delete;
+    // Opens it, anew where it was open.
+    void open();
+
+    const std::string text;
+    zpgs_accelerator *accelerator = nullptr;
+    std::string error;  // why it did not open
+    // To be opened again before the next step: its driver has given it up.
+    bool reopen = false;
+    uint64_t openings = 0;
+    uint32_t worlds = 0;
+};
+
 struct ZynqPgsCounts {
     // Steps that the board solved, and steps that Bullet's solver took over from it.
     uint64_t boardSteps = 0;
@@ -76,12 +95,16 @@ struct ZynqPgsCounts {
 class ZynqPgsSolver : public btSequentialImpulseConstraintSolver {
 public:
     // Opens the board. If this fails, isOpen() is false, and every step is Bullet's.
-    explicit ZynqPgsSolver(const char *board, const ZynqPgsOptions &options = ZynqPgsOptions());
+    explicit ZynqPgsSolver(const char *board, const ZynqPgsOptions &options = ZynqPgsOptions())
+        : ZynqPgsSolver(std::make_shared<ZynqPgsBoard>(board), options) {}
+    // Of a world that shares the board with others.
+    explicit ZynqPgsSolver(std::shared_ptr<ZynqPgsBoard> board,
+                           const ZynqPgsOptions &options = ZynqPgsOptions());
     ~ZynqPgsSolver() override;
     ZynqPgsSolver(const ZynqPgsSolver &) = delete;
     ZynqPgsSolver &operator=(const ZynqPgsSolver &) = delete;
 
-    bool isOpen() const { return m_board != nullptr; }
+    bool isOpen() const { return m_board->accelerator != nullptr; }
     // Why the board did not open, or why the last step on it failed. Empty if neither happened.
     const std::string &lastError() const { return m_lastError; }
     const ZynqPgsCounts &counts() const { return m_counts; }
@@ -94,8 +117,6 @@ public:
     void allSolved(const btContactSolverInfo &info, btIDebugDraw *debugDrawer) override;
 
 private:
-    bool open();
-    bool loadShapes();
     void setParameters(const btContactSolverInfo &info, zpgs_parameters &parameters) const;
     bool stepBoard(const btContactSolverInfo &info);
     void loadImpulses(const btContactSolverInfo &info, zpgs_parameters &parameters);
@@ -107,19 +128,17 @@ private:
     bool failed(zpgs_status status);
     void say(const std::string &error);
 
-    const std::string m_boardText;
+    const std::shared_ptr<ZynqPgsBoard> m_board;
+    const uint32_t m_world;  // its number on the board
     const ZynqPgsOptions m_options;
-    zpgs_accelerator *m_board = nullptr;
-    bool m_reopen = false;
+    // The opening of the board that has the impulses at this world's places.
+    uint64_t m_opening = 0;
     // Whether the board takes and gives impulses, once it is known.
     enum class Impulses { Unknown, Has, Lacks } m_boardImpulses = Impulses::Unknown;
     // The tangential impulses of Bullet's points are along the board's tangents, not Bullet's.
     bool m_frictionIsBoards = false;
     uint64_t m_steps = 0;
     ZynqPgsGather m_gather;
-    // The shapes that the board has.
-    bool m_hasShapes = false;
-    uint64_t m_shapesVersion = 0;
     btDispatcher *m_dispatcher = nullptr;
     ZynqPgsCounts m_counts;
     std::string m_lastError;

@@ -2,10 +2,11 @@
 //! manager, accelerator.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ColorChoice};
 use zynq_pgs::BoardChoice;
+use zynq_pgs::emulation::Build;
 use zynq_pgs::error::BoardTextError;
 use zynq_pgs::platform::{ManagerChoice, MemoryChoice};
 
@@ -18,6 +19,18 @@ pub struct CommonOptions {
     /// Print one JSON document instead of text.
     #[arg(long, global = true)]
     pub json: bool,
+    /// Colours: auto, always, never
+    ///
+    /// With auto a terminal has them, unless `NO_COLOR` is set.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
+    pub color: ColorChoice,
 }
 
 /// The heading of the options of a board.
@@ -29,17 +42,12 @@ const HEADING: &str = "Board";
 pub struct BoardOptions {
     /// Board to use.
     #[arg(
-        help = "Board to use: auto, uio[:NODE], devmem, emulated, socket:PATH",
-        long_help = "Board to use: auto (the UIO node \"pgs\" if there is one, else emulated), \
-                     uio[:NODE] (the UIO node of that name, or NODE-control, NODE-dma0 ... for \
-                     each region), devmem (registers through /dev/mem, at the addresses of the \
-                     interface; needs root), emulated or socket:PATH (one that `pgs serve` serves) \
-                     [env: PGS_BOARD] [default: auto]",
+        help = "Board: auto, uio[:NODE], devmem, emulated[:BUILD], socket:PATH",
+        long_help = board_help(),
         long,
-        value_name = "BOARD",
-        value_parser = board_name
+        value_name = "BOARD"
     )]
-    board: Option<BoardName>,
+    board: Option<BoardChoice>,
     /// DMA memory of a real board.
     #[arg(
         help = "DMA memory of a real board: auto (the u-dma-buf \"pgs\", else the UIO node \
@@ -52,6 +60,19 @@ pub struct BoardOptions {
     memory: Option<MemoryChoice>,
     #[command(flatten)]
     manager: ManagerOptions,
+}
+
+fn board_help() -> String {
+    format!(
+        "Board: auto (the UIO node \"pgs\" if there is one, else emulated), uio[:NODE] (the UIO \
+         node of that name, or NODE-control, NODE-dma0 ... for each region), devmem (registers \
+         through /dev/mem, at the addresses of the interface; needs root), emulated[:BUILD] or \
+         socket:PATH (one that `pgs serve` serves) [env: PGS_BOARD] [default: auto]\n\nBUILD is a \
+         profile ({}), and behind it, after commas, changes of its defaults: {}; as \
+         emulated:float,world",
+        Build::names("profile").join(", "),
+        Build::words()
+    )
 }
 
 /// The option of a verb that asks the FPGA manager.
@@ -98,6 +119,8 @@ pub struct Given {
     pub manager: Option<ManagerOptions>,
     /// Present in a verb that may build an emulated board.
     pub accelerator: Option<AcceleratorOptions>,
+    /// Threads of this machine, if the verb has the option.
+    pub threads: Option<usize>,
 }
 
 impl Given {
@@ -107,27 +130,12 @@ impl Given {
     }
 }
 
-/// The accelerator of an emulated board.
+/// The accelerator of an emulated board: the built-in model, or a simulator.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum AcceleratorChoice {
-    /// The built-in model.
-    #[default]
-    Model,
-    /// A simulator of the generated Verilog, at this path.
-    Rtl(PathBuf),
-    /// The simulator at this path, and the model in lock step with it.
-    Both(PathBuf),
-}
-
-impl AcceleratorChoice {
-    /// The path of the simulator, and whether the model runs beside it.
-    pub fn simulator(&self) -> Option<(&Path, bool)> {
-        match self {
-            Self::Model => None,
-            Self::Rtl(path) => Some((path, false)),
-            Self::Both(path) => Some((path, true)),
-        }
-    }
+pub struct AcceleratorChoice {
+    /// The path of a simulator of the generated Verilog, and whether the model runs beside it in
+    /// lock step.
+    pub simulator: Option<(PathBuf, bool)>,
 }
 
 /// The options of every verb, with the environment and the defaults filled in.
@@ -136,7 +144,9 @@ pub struct CommonArgs {
     /// Whether to print one JSON document instead of text.
     pub json: bool,
     /// The board.
-    pub board: BoardName,
+    pub board: BoardChoice,
+    /// Threads of this machine, in place of the default.
+    pub threads: Option<usize>,
     /// DMA memory of a real board.
     pub memory: MemoryChoice,
     /// Whether the memory was named by the environment and not by the command line.
@@ -147,60 +157,15 @@ pub struct CommonArgs {
     pub accelerator: AcceleratorChoice,
 }
 
-/// A board named on the command line.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum BoardName {
-    /// The UIO node if there is one, else the emulated board.
-    Auto,
-    /// A UIO node of this name, or one node for each region.
-    Uio(String),
-    /// Registers through /dev/mem.
-    Devmem,
-    /// An emulated board of this process.
-    Emulated,
-    /// A board in another process, served at this socket.
-    Socket(PathBuf),
-}
-
-/// The emulated board; its build is in options of its own.
-const EMULATED: &str = "emulated";
-
-/// Reads the name of a board.
-fn board_name(text: &str) -> Result<BoardName, String> {
-    let choice: BoardChoice = match text.parse() {
-        Ok(BoardChoice::Built(_)) if text != EMULATED => {
-            return Err(format!(
-                "give --board {EMULATED}, and its build as options (--profile and others)"
-            ));
-        }
-        Err(BoardTextError::Unknown { .. }) => {
-            return Err("expected auto, uio[:NODE], devmem, emulated or socket:PATH".to_owned());
-        }
-        choice => choice.map_err(|error| error.to_string())?,
-    };
-    match choice {
-        BoardChoice::Automatic => Ok(BoardName::Auto),
-        BoardChoice::Uio { node } => Ok(BoardName::Uio(node)),
-        BoardChoice::DevMem(_) => Ok(BoardName::Devmem),
-        BoardChoice::Built(_) => Ok(BoardName::Emulated),
-        BoardChoice::Served { socket } => Ok(BoardName::Socket(socket)),
-        _ => Err(format!("no command takes the board {text:?}")),
-    }
-}
-
 /// Reads the choice of an accelerator.
 fn accelerator_choice(text: &str) -> Result<AcceleratorChoice, String> {
     match text.split_once(':') {
-        None if text == "model" => Ok(AcceleratorChoice::Model),
-        Some(("rtl", path)) if !path.is_empty() => Ok(AcceleratorChoice::Rtl(path.into())),
-        Some(("both", path)) if !path.is_empty() => Ok(AcceleratorChoice::Both(path.into())),
+        None if text == "model" => Ok(AcceleratorChoice::default()),
+        Some((kind @ ("rtl" | "both"), path)) if !path.is_empty() => {
+            Ok(AcceleratorChoice { simulator: Some((path.into(), kind == "both")) })
+        }
         _ => Err("expected model, rtl:PATH or both:PATH".to_owned()),
     }
-}
-
-/// Reads the path of a simulator.
-fn simulator_path(text: &str) -> Result<AcceleratorChoice, String> {
-    Ok(AcceleratorChoice::Rtl(text.into()))
 }
 
 /// Reads the choice of an FPGA manager.
@@ -222,12 +187,23 @@ impl CommonArgs {
     pub fn emulated() -> Self {
         Self {
             json: false,
-            board: BoardName::Emulated,
+            board: BoardChoice::Built(Build::default()),
+            threads: None,
             memory: MemoryChoice::Automatic,
             memory_of_environment: false,
             manager: ManagerChoice::Automatic,
-            accelerator: AcceleratorChoice::Model,
+            accelerator: AcceleratorChoice::default(),
         }
+    }
+
+    /// The build of an emulated board, with the threads of this machine.
+    #[must_use]
+    pub fn build(&self) -> Build {
+        let build = match self.board {
+            BoardChoice::Built(build) => build,
+            _ => Build::default(),
+        };
+        Build { threads: self.threads.or(build.threads), ..build }
     }
 }
 
@@ -244,21 +220,23 @@ impl CommonOptions {
     ) -> Result<CommonArgs, String> {
         if given.builds_boards()
             && let Some(board) = variable(BOARD).filter(|board| !is_blank(board))
-            && !["auto", EMULATED].iter().any(|own| board == *own)
+            && !["auto", "emulated"].iter().any(|own| board == *own)
         {
             log::warn!("{BOARD} is {board:?}: this command builds emulated boards of its own");
         }
-        let Given { board: boards, manager, accelerator } = given;
+        let Given { board: boards, manager, accelerator, threads } = given;
         let opens = boards.is_some();
         let (mut board, mut memory, mut of_board) = (None, None, None);
         if let Some(options) = boards {
             (board, memory, of_board) = (options.board, options.memory, Some(options.manager));
             if board.is_none() {
-                board = instead_of("--board", BOARD, &variable, board_name)?;
+                board = instead_of("--board", BOARD, &variable, |text| {
+                    text.parse().map_err(|error: BoardTextError| error.to_string())
+                })?;
             }
         }
-        let board = board.unwrap_or(BoardName::Auto);
-        let real = !matches!(board, BoardName::Emulated | BoardName::Socket(_));
+        let board = board.unwrap_or_default();
+        let real = !matches!(board, BoardChoice::Built(_) | BoardChoice::Served { .. });
         let named = match opens && real && memory.is_none() {
             true => instead_of("--memory", MEMORY, &variable, memory_choice)?,
             false => None,
@@ -271,7 +249,7 @@ impl CommonOptions {
             }
             options => options.and_then(|options| options.manager),
         };
-        let emulated = matches!(board, BoardName::Auto | BoardName::Emulated);
+        let emulated = matches!(board, BoardChoice::Automatic | BoardChoice::Built(_));
         let accelerator = match accelerator {
             Some(AcceleratorOptions { accelerator: Some(_) }) if !emulated => {
                 return Err(
@@ -281,13 +259,15 @@ impl CommonOptions {
                 );
             }
             Some(AcceleratorOptions { accelerator: None }) if emulated => {
-                instead_of("--accelerator", RTL, &variable, simulator_path)?
+                instead_of("--accelerator", RTL, &variable, |path| {
+                    Ok(AcceleratorChoice { simulator: Some((path.into(), false)) })
+                })?
             }
             options => options.and_then(|options| options.accelerator),
         };
         let (json, manager) = (self.json, manager.unwrap_or_default());
         let accelerator = accelerator.unwrap_or_default();
-        Ok(CommonArgs { json, board, memory, memory_of_environment, manager, accelerator })
+        Ok(CommonArgs { json, board, threads, memory, memory_of_environment, manager, accelerator })
     }
 }
 
@@ -311,30 +291,6 @@ fn instead_of<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_board_is_named_as_in_the_library_and_its_build_in_options() {
-        let node = |name: &str| BoardName::Uio(name.to_owned());
-        for (text, board) in [
-            ("auto", BoardName::Auto),
-            ("uio", node("pgs")),
-            ("uio:other", node("other")),
-            ("devmem", BoardName::Devmem),
-            ("emulated", BoardName::Emulated),
-            ("socket:a:b", BoardName::Socket("a:b".into())),
-        ] {
-            assert_eq!(board_name(text), Ok(board));
-        }
-        for (text, part) in [
-            ("emulated:float", "--profile"),
-            ("emulated:fast", "begin with a profile"),
-            ("uio:", "expected auto, "),
-            ("abacus", "expected auto, "),
-        ] {
-            let error = board_name(text).expect_err(text);
-            assert!(error.contains(part), "{error}");
-        }
-    }
 
     #[test]
     fn a_manager_is_a_device_none_or_found_by_its_name() {

@@ -12,8 +12,6 @@ pub const MANAGER: &str = "PGS_MANAGER";
 pub const RTL: &str = "PGS_RTL";
 /// Sets the filter of the log.
 pub const LOG: &str = "RUST_LOG";
-/// Sets the colours of the log.
-pub const LOG_STYLE: &str = "RUST_LOG_STYLE";
 
 /// Reads a variable of this process.
 pub fn variable(name: &str) -> Option<OsString> {

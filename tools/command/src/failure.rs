@@ -16,8 +16,8 @@ use std::process::ExitCode;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::output::SCHEMA;
 use crate::output::width::{of_terminal, wrapped};
+use crate::output::{BAD, SCHEMA};
 
 /// The exit code of an interrupted command.
 pub const INTERRUPTED: u8 = 130;
@@ -108,7 +108,7 @@ impl Failure {
 
     /// Adds the planned faults: a line for people, and a value for programs.
     pub fn planned(mut self, line: &str, faults: Value) -> Self {
-        self.details.push_str(&format!("{line}\n"));
+        self.details.push_str(&format!("faults     {line}\n"));
         if let Some(document) = &mut self.document {
             document["faults"] = faults;
         }
@@ -149,7 +149,7 @@ impl Failure {
         }
     }
 
-    /// Reports the failure on `stderr`.
+    /// Reports the failure on `stderr`, in colours.
     pub fn report(&self, stderr: &mut impl Write) -> ExitCode {
         if self.is_closed_pipe() {
             return ExitCode::SUCCESS;
@@ -159,6 +159,7 @@ impl Failure {
             Some(columns) => broken(&chain, columns),
             None => chain,
         };
+        let chain = chain.replacen("error:", &format!("{BAD}error:{BAD:#}"), 1);
         // With stderr closed, the exit code still tells the failure.
         let _ = writeln!(stderr, "{chain}");
         let _ = write!(stderr, "{}", self.details);
@@ -213,7 +214,7 @@ pub fn report_usage(message: &clap::Error) -> ExitCode {
         // Without a stream to print a usage error, the exit code still shows it.
         _ if message.use_stderr() => ExitCode::from(2),
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => Failure::from(error).report(&mut io::stderr().lock()),
+        Err(error) => Failure::from(error).report(&mut anstream::stderr().lock()),
     }
 }
 
@@ -277,9 +278,6 @@ mod tests {
         assert!(stderr.is_empty());
         Failure::from(io::Error::from(io::ErrorKind::StorageFull)).report(&mut stderr);
         let text = String::from_utf8(stderr).expect("text");
-        assert!(
-            text.starts_with("error: standard output cannot be written\n  because: "),
-            "{text}"
-        );
+        assert!(text.contains(" standard output cannot be written\n  because: "), "{text}");
     }
 }

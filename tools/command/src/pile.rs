@@ -1,9 +1,9 @@
 //! A pile of cubes for a board, and the steps to the state in which a verb measures it: one way, so
 //! that "step 70 of the pile" is the same step everywhere.
 
+use bitstream_model::BoardConfig;
 use scene::{Grid, Scene, SceneOptions};
 use zynq_pgs::StepParameters;
-use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
 
 use crate::board::{self, OpenBoard};
@@ -31,10 +31,10 @@ pub fn open(
     grid: Grid,
     drop: f32,
     common: &CommonArgs,
-    build: &Build,
+    config: BoardConfig,
 ) -> Result<(Scene, OpenBoard)> {
     scenes::check_rows(grid)?;
-    let mut opened = board::open(common, build)?.stated();
+    let mut opened = board::open(common, config)?.stated();
     scenes::check_size(grid, opened.accelerator.capabilities())?;
     let scene = self::build(grid, drop)?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
@@ -85,16 +85,16 @@ mod tests {
     fn the_state_is_that_of_steps_in_the_order_of_detection() {
         let grid = Grid::new(3, 3, 3).expect("a grid");
         let (mut scene, mut opened) =
-            open(grid, 0.2, &CommonArgs::emulated(), &Build::default()).expect("a board");
+            open(grid, 0.2, &CommonArgs::emulated(), BoardConfig::default()).expect("a board");
         let mut by_hand = build(grid, 0.2).expect("a pile");
-        let given = StepParameters::default().with_order(Some(Order::AsGiven));
+        let given = StepParameters::thesis().with_order(Some(Order::AsGiven));
         for _ in 0..40 {
             by_hand.detect();
             let (bodies, collisions) = by_hand.parts_mut();
             opened.accelerator.step(bodies, collisions, &given).expect("a step");
         }
         by_hand.detect();
-        let defaults = StepParameters::default();
+        let defaults = StepParameters::thesis();
         assert!(step_to(&mut scene, &mut opened, &defaults, 40, || true).expect("steps"));
         assert_eq!(scene.bodies(), by_hand.bodies());
         assert_eq!(scene.collisions(), by_hand.collisions());
@@ -108,8 +108,8 @@ mod tests {
             [([180, 1000, 180], "no board takes"), ([60, 60, 60], "the board takes at most")]
         {
             let grid = Grid::new(x, y, z).expect("a grid");
-            let refused =
-                open(grid, 0.0, &CommonArgs::emulated(), &Build::default()).expect_err("too large");
+            let refused = open(grid, 0.0, &CommonArgs::emulated(), BoardConfig::default())
+                .expect_err("too large");
             assert!(refused.chain().contains(part), "{}", refused.chain());
         }
     }

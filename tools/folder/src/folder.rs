@@ -214,7 +214,7 @@ impl Folder {
             })
             .collect();
 
-        let mut parameters = StepParameters::default();
+        let mut parameters = StepParameters::thesis();
         parameters.time_step = params[0];
         parameters.position_drift = params[1];
         parameters.position_coefficient = params[2];

@@ -1,5 +1,5 @@
-//! The processor's part of a step on a ZCU102, on paper: four Cortex-A53 cores, by the model of
-//! `docs/worth.md`.
+//! A step on the processor of a ZCU102, on paper: the driver's part, and the whole step in software,
+//! on four Cortex-A53 cores, by the model of `docs/worth.md`.
 
 use serde_json::{Map, Value};
 use zynq_pgs::board::BoardKind;
@@ -34,17 +34,29 @@ const PARTS: [(&str, Of, [[f64; 2]; 2]); 8] = [
 /// The place of the detection, which is no part of the driver.
 const DETECTION: usize = 0;
 
+/// The time of a step that is solved in software, by the emulated board's own solver in lanes, on
+/// one core: ns a collision, and ns a collision and pass; by scene and start as the parts.
+///
+/// The script holds these, too.
+const SOFTWARE: [[[f64; 2]; 2]; 2] =
+    [[[1126.0, 165.0], [1315.0, 168.0]], [[1086.0, 271.0], [1343.0, 274.0]]];
+
 /// The item that a part handles.
 enum Of {
     Collision,
     Body,
 }
 
-/// The time of each part on four cores, ms; a sum over steps.
+/// Times on four cores, ms; a sum over steps.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct HostTimes([f64; PARTS.len()]);
+pub(crate) struct Paper {
+    /// The time of each part.
+    parts: [f64; PARTS.len()],
+    /// The time of the step in software.
+    software: f64,
+}
 
-impl HostTimes {
+impl Paper {
     /// The times of one step, with the detection if it `detects`. `None` for a board that is not
     /// emulated, for streams in sixteen bits, and for an order that the host computes: the script
     /// does not count them.
@@ -58,7 +70,7 @@ impl HostTimes {
         let counted = matches!(kind, BoardKind::Emulated | BoardKind::Served)
             && format == StreamFormat::F32
             && report.order != Order::HazardFree;
-        let StepReport { bodies, collisions, .. } = *report;
+        let StepReport { bodies, collisions, passes, .. } = *report;
         let is_large = BYTES[0] * collisions + BYTES[1] * bodies > CACHE;
         let part = |(_, of, ns): &(_, Of, [[f64; 2]; 2])| {
             let count = match of {
@@ -69,40 +81,51 @@ impl HostTimes {
         };
         let mut parts = PARTS.each_ref().map(part);
         parts[DETECTION] *= f64::from(u8::from(detects));
-        counted.then_some(Self(parts))
+        let [once, a_pass] = SOFTWARE[usize::from(is_large)][usize::from(warm)];
+        let ns = once + a_pass * f64::from(passes);
+        counted.then_some(Self { parts, software: ns * collisions as f64 / CORES / 1e6 })
     }
 
     /// Adds the times of another step.
     pub(crate) fn and(self, other: Self) -> Self {
-        Self(std::array::from_fn(|part| self.0[part] + other.0[part]))
+        let parts = std::array::from_fn(|part| self.parts[part] + other.parts[part]);
+        Self { parts, software: self.software + other.software }
     }
 
-    /// The mean of a step, for people, and whether it or the board's `board` ms limit.
-    pub(crate) fn text(self, steps: u32, board: f64) -> String {
-        let [detection, driver @ ..] = self.0.map(|ms| ms / f64::from(steps.max(1)));
-        let driver: f64 = driver.iter().sum();
-        let limit = |host: f64| if host > board { "host" } else { "board" };
-        let mut text = format!(
-            "A53, on paper: {driver:.3} ms a step on four cores, {:.3} ms with the board: the {} \
-             limits",
-            driver + board,
-            limit(driver),
-        );
-        if detection > 0.0 {
-            let with = limit(driver + detection);
-            text += &format!("; with the search, {detection:.3} ms more, the {with} limits");
-        }
-        text
+    /// The driver's part, without the detection, ms.
+    fn driver(&self) -> f64 {
+        self.parts[DETECTION + 1..].iter().sum()
     }
 
-    /// For programs: the parts, and all of them but the detection.
+    /// How many times as long as board and driver the software takes for these steps, with `board`
+    /// ms on the board for each.
+    pub(crate) fn ratio(&self, steps: u32, board: f64) -> f64 {
+        self.software / (self.driver() + board * f64::from(steps.max(1)))
+    }
+
+    /// For programs: the parts, all of them but the detection, and the step in software.
     pub(crate) fn to_json(self) -> Value {
         let parts =
-            PARTS.iter().zip(self.0).map(|((name, ..), ms)| ((*name).to_owned(), ms.into()));
+            PARTS.iter().zip(self.parts).map(|((name, ..), ms)| ((*name).to_owned(), ms.into()));
         let mut parts: Map<String, Value> = parts.collect();
-        parts.insert("step".to_owned(), self.0[1..].iter().sum::<f64>().into());
+        parts.insert("step".to_owned(), self.driver().into());
+        parts.insert("software".to_owned(), self.software.into());
         parts.into()
     }
+}
+
+/// The ratio of steps for people, with its two sides.
+pub(crate) fn ratio_text(paper: Option<Paper>, steps: u32, board: f64) -> String {
+    let Some(paper) = paper else {
+        return "not counted for sixteen bits, hazard-free, and real boards".into();
+    };
+    let each = |ms: f64| ms / f64::from(steps.max(1));
+    format!(
+        "{:.1} (on paper): {:.1} ms with driver, {:.1} ms on four A53 alone",
+        paper.ratio(steps, board),
+        each(paper.driver()) + board,
+        each(paper.software),
+    )
 }
 
 #[cfg(test)]
@@ -110,14 +133,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longer_of_host_and_board_limits() {
-        let mut times = [1.0; PARTS.len()];
-        times[DETECTION] = 6.0;
-        let told = HostTimes(times).and(HostTimes(times)).text(2, 9.0);
-        let expected = "A53, on paper: 7.000 ms a step on four cores, 16.000 ms with the board: the \
-                        board limits; with the search, 6.000 ms more, the host limits";
-        assert_eq!(told, expected);
-        times[DETECTION] = 0.0;
-        assert!(HostTimes(times).text(1, 6.9).ends_with("with the board: the host limits"));
+    fn the_ratio_is_that_of_software_to_board_and_driver() {
+        let mut parts = [1.0; PARTS.len()];
+        parts[DETECTION] = 6.0;
+        let step = Paper { parts, software: 64.0 };
+        let (two, told) =
+            (step.and(step), "4.0 (on paper): 16.0 ms with driver, 64.0 ms on four A53");
+        assert!((two.ratio(2, 9.0) - 4.0).abs() < 1e-12);
+        assert!(ratio_text(Some(two), 2, 9.0).starts_with(told));
+        assert!(ratio_text(None, 2, 9.0).starts_with("not counted"));
     }
 }

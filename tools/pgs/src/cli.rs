@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 
+use anstream::ColorChoice;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
 
@@ -33,7 +34,14 @@ Exit codes: 0 done; 1 a comparison or a check failed; 2 wrong usage or unreadabl
 usable board, or no rights; 4 hardware fault or deadline; 130 interrupted.";
 
 /// The end of the short help.
-const MORE: &str = "`pgs --help` has all options and examples, `pgs VERB --help` those of a verb.";
+const MORE: &str = "\
+Examples:
+  pgs                                  drop 38,880 cubes
+  pgs --scene shapes --view pile.html  a pile and its page
+  pgs check --board emulated           test a board
+
+Without a verb `pgs` runs `run`. `pgs VERB -h` has a verb's
+options, `pgs VERB --help` all of them, with examples.";
 
 /// Steps rigid bodies on the zynq-pgs accelerator, real or emulated.
 ///
@@ -49,21 +57,20 @@ struct Cli {
     run: RunArgs,
 }
 
-/// Options of `run`, also without the verb, that `-h` shows, in two screens; `--help` shows all.
-const SHORT: [&str; 17] = [
+/// Options that `pgs run -h` shows, in two screens; `pgs run --help` shows all.
+const SHORT: [&str; 16] = [
     "steps",
     "scene",
     "grid",
     "drop",
     "report_every",
     "json",
+    "color",
     "contact_iterations",
     "friction_iterations",
     "warm_start",
     "order",
     "board",
-    "profile",
-    "hazards",
     "threads",
     "fault",
     "view",
@@ -76,7 +83,24 @@ pub(crate) fn definition() -> clap::Command {
         let hidden = !SHORT.contains(&argument.get_id().as_str());
         argument.hide_short_help(hidden)
     };
-    Cli::command().mut_args(short).mut_subcommand("run", |run| run.mut_args(short))
+    // They stand in the help of the verb.
+    let of_run = |argument: clap::Arg| match argument.is_global_set() {
+        true => argument,
+        false => argument.hide_short_help(true).hide_long_help(true),
+    };
+    Cli::command().mut_args(of_run).mut_subcommand("run", |run| run.mut_args(short))
+}
+
+/// The colours that the command line asks for: also for the words of the parser and of the log.
+pub(crate) fn color(arguments: &[OsString]) -> ColorChoice {
+    let mut words = arguments.iter().filter_map(|word| word.to_str());
+    let value = words.find_map(|word| word.strip_prefix("--color"));
+    let value = value.and_then(|value| value.strip_prefix('=').or_else(|| words.next()));
+    match value {
+        Some("always") => ColorChoice::Always,
+        Some("never") => ColorChoice::Never,
+        _ => ColorChoice::Auto,
+    }
 }
 
 /// A parsed command line.
@@ -89,15 +113,19 @@ pub(crate) struct Command {
 /// Parses the command line, and reads options that it leaves out from `variable`. A request for
 /// help is an error, too.
 pub(crate) fn parse(
-    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    arguments: &[OsString],
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<Command, clap::Error> {
-    let mut command = definition();
+    let mut command = definition().color(match color(arguments) {
+        ColorChoice::Always | ColorChoice::AlwaysAnsi => clap::ColorChoice::Always,
+        ColorChoice::Never => clap::ColorChoice::Never,
+        ColorChoice::Auto => clap::ColorChoice::Auto,
+    });
     let matches = command.try_get_matches_from_mut(arguments)?;
     if let Some(verb) = matches.subcommand_name() {
         // `run`'s options are accepted here as well; before another verb they would have no effect.
         let stray = matches.ids().find(|id| {
-            let common = id.as_str() == "json";
+            let common = ["json", "color"].contains(&id.as_str());
             let is_argument = command.get_arguments().any(|argument| argument.get_id() == *id);
             let given = || matches.value_source(id.as_str()) == Some(ValueSource::CommandLine);
             !common && is_argument && given()
@@ -123,14 +151,23 @@ pub(crate) fn parse(
 mod tests {
     use bitstream_model::interface::address_map::UIO_NODE;
     use clap::error::ErrorKind;
+    use zynq_pgs::BoardChoice;
     use zynq_pgs::platform::{ManagerChoice, MemoryChoice};
 
     use super::*;
-    use pgs_command::common::BoardName;
     use pgs_command::environment::{BOARD, MEMORY};
 
+    /// Whether that is the UIO node of this name.
+    fn is_uio(board: &BoardChoice, name: &str) -> bool {
+        matches!(board, BoardChoice::Uio { node } if node == name)
+    }
+
+    fn words(line: &str) -> Vec<OsString> {
+        line.split_whitespace().map(OsString::from).collect()
+    }
+
     fn parsed(line: &str) -> Result<Command, ErrorKind> {
-        parse(line.split_whitespace(), |_| None).map_err(|error| error.kind())
+        parse(&words(line), |_| None).map_err(|error| error.kind())
     }
 
     /// Parses with `PGS_BOARD` and `PGS_MEMORY` set; or the error message.
@@ -140,19 +177,19 @@ mod tests {
             MEMORY => Some(memory.into()),
             _ => None,
         };
-        let command = parse(line.split_whitespace(), variable);
+        let command = parse(&words(line), variable);
         command.map(|command| command.common).map_err(|error| error.to_string())
     }
 
     #[test]
     fn the_environment_says_what_the_command_line_does_not() {
         let common = parsed_in("uio", "uio:m", "pgs run").expect("both");
-        assert_eq!(common.board, BoardName::Uio(UIO_NODE.to_owned()));
+        assert!(is_uio(&common.board, UIO_NODE));
         assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() });
         assert!(common.memory_of_environment);
         let common = parsed_in("uio", "uio:m", "pgs run --board devmem --memory uio:n");
         let common = common.expect("neither");
-        assert_eq!(common.board, BoardName::Devmem);
+        assert!(matches!(common.board, BoardChoice::DevMem(_)));
         assert_eq!(common.memory, MemoryChoice::Uio { node: "n".to_owned() });
         assert!(!common.memory_of_environment);
     }
@@ -162,7 +199,7 @@ mod tests {
         for blank in ["", " ", "	 "] {
             for line in ["pgs", "pgs run", "pgs list --json"] {
                 let common = parsed_in(blank, blank, line).expect("as if unset");
-                assert_eq!(common.board, BoardName::Auto, "{line}");
+                assert!(matches!(common.board, BoardChoice::Automatic), "{line}");
                 assert_eq!(common.memory, MemoryChoice::Automatic, "{line}");
             }
         }
@@ -171,7 +208,10 @@ mod tests {
     #[test]
     fn a_wrong_variable_is_named_and_breaks_nothing_that_does_without() {
         let said = parsed_in("abacus", "", "pgs run").expect_err("no board");
-        assert!(said.contains("PGS_BOARD is \"abacus\": expected auto"), "{said}");
+        assert!(
+            said.contains("PGS_BOARD is \"abacus\": found \"abacus\" as a board: give auto"),
+            "{said}"
+        );
         assert!(said.contains("give --board"), "{said}");
         let said = parsed_in("uio", "drum", "pgs run").expect_err("no memory");
         assert!(
@@ -184,12 +224,26 @@ mod tests {
             "pgs --board emulated",
             "pgs solve x --memory uio --board uio",
             "pgs thesis",
-            "pgs thesis step",
+            "pgs thesis cycles",
             "pgs load x",
             "pgs thesis detection --input x",
         ] {
             parsed_in("abacus", "drum", line).unwrap_or_else(|said| panic!("{line}: {said}"));
         }
+    }
+
+    #[test]
+    fn colours_are_asked_for_wherever_the_option_stands() {
+        for (line, expected) in [
+            ("pgs", ColorChoice::Auto),
+            ("pgs --color never", ColorChoice::Never),
+            ("pgs check --color=always", ColorChoice::Always),
+            ("pgs --color auto --color=always", ColorChoice::Auto),
+        ] {
+            assert_eq!(color(&words(line)), expected, "{line}");
+        }
+        parsed("pgs check --color=always").expect("a colour");
+        parsed("pgs --color red").expect_err("no colour");
     }
 
     #[test]
@@ -220,7 +274,7 @@ mod tests {
             let common = parsed(line).expect(line).common;
             assert!(common.json, "{line}");
             assert_eq!(common.memory, MemoryChoice::Uio { node: "m".to_owned() }, "{line}");
-            assert_eq!(common.board, BoardName::Emulated, "{line}");
+            assert!(matches!(common.board, BoardChoice::Built(_)), "{line}");
             assert_eq!(common.manager, ManagerChoice::Device("fpga2".to_owned()), "{line}");
         }
     }
@@ -229,15 +283,17 @@ mod tests {
     fn a_board_is_named_by_its_node_as_memory_is() {
         let board =
             |text: &str| parsed(&format!("pgs check --board {text}")).map(|c| c.common.board);
-        let uio = |node: &str| Ok(BoardName::Uio(node.to_owned()));
-        assert_eq!(board("uio"), uio("pgs"));
-        assert_eq!(board("uio:pgs@a0000000"), uio("pgs@a0000000"));
-        assert_eq!(board("uio:a:b"), uio("a:b"));
+        for (text, node) in
+            [("uio", "pgs"), ("uio:pgs@a0000000", "pgs@a0000000"), ("uio:a:b", "a:b")]
+        {
+            assert!(is_uio(&board(text).expect(text), node), "{text}");
+        }
     }
 
     #[test]
     fn the_help_warns_of_logic_that_nobody_asks_about() {
-        let help = definition().render_long_help().to_string();
+        let mut pgs = definition();
+        let help = pgs.find_subcommand_mut("run").expect("a verb").render_long_help().to_string();
         let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(words.contains("WARNING") && words.contains("hangs the processor"), "{words}");
     }
@@ -245,8 +301,8 @@ mod tests {
     #[test]
     fn a_served_board_is_named_by_its_socket() {
         let common = parsed("pgs run --board socket:/a/b").expect("a board").common;
-        assert_eq!(common.board, BoardName::Socket("/a/b".into()));
-        let served = parsed("pgs serve --socket x --profile half").expect("a board");
+        assert!(matches!(common.board, BoardChoice::Served { socket } if socket.ends_with("b")));
+        let served = parsed("pgs serve --socket x --board emulated:half").expect("a board");
         assert!(matches!(served.verb, Verb::Serve(args) if args.socket.ends_with("x")));
     }
 
@@ -254,22 +310,24 @@ mod tests {
     #[test]
     fn options_of_a_board_belong_to_verbs_that_open_one() {
         for verb in ["faults", "serve --socket x", "thesis half", "thesis compare float half"] {
-            for option in ["--board uio", "--memory uio", "--manager fpga0"] {
+            for option in ["--memory uio", "--manager fpga0"] {
                 let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
                 assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
             }
+            parsed(&format!("pgs {verb} --board uio")).expect_err(verb);
             parsed(&format!("pgs {verb} --accelerator rtl:x")).expect(verb);
         }
-        for verb in ["thesis step", "thesis ladder", "thesis detection --input x", "load x"] {
+        for verb in ["thesis cycles", "thesis ladder", "thesis detection --input x", "load x"] {
             for option in ["--board uio", "--memory uio", "--accelerator model"] {
                 let found = parsed(&format!("pgs {verb} {option}")).map(|_| ());
                 assert_eq!(found, Err(ErrorKind::UnknownArgument), "{verb} {option}");
             }
         }
         let real = parsed_in("uio", "uio:m", "pgs thesis formats").expect("a board");
-        assert_eq!(real.board, BoardName::Uio(UIO_NODE.to_owned()));
-        for line in ["pgs faults", "pgs thesis half", "pgs thesis step", "pgs serve --socket x"] {
-            assert_eq!(parsed_in("uio", "uio:m", line).expect(line).board, BoardName::Auto);
+        assert!(is_uio(&real.board, UIO_NODE));
+        for line in ["pgs faults", "pgs thesis half", "pgs thesis cycles", "pgs serve --socket x"] {
+            let own = parsed_in("uio", "uio:m", line).expect(line).board;
+            assert!(matches!(own, BoardChoice::Automatic), "{line}");
         }
     }
 
@@ -278,7 +336,7 @@ mod tests {
         assert_eq!(parsed("pgs --board uio list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(parsed("pgs --steps 5 list").expect_err("stray"), ErrorKind::ArgumentConflict);
         assert_eq!(
-            parsed("pgs --hazards unchecked solve x").expect_err("stray"),
+            parsed("pgs --threads 1 solve x").expect_err("stray"),
             ErrorKind::ArgumentConflict
         );
     }
@@ -292,11 +350,7 @@ mod tests {
             "pgs --grid 0x1x1",
             "pgs --drop nan",
             "pgs --drop -1",
-            "pgs --window 0",
-            "pgs --window 99999999999",
-            "pgs --bandwidth 0",
-            "pgs --bandwidth inf",
-            "pgs --bandwidth -3",
+            "pgs --threads 0",
             "pgs --report-every 0",
             "pgs --memory udmabuf",
             "pgs --memory file:",
@@ -306,8 +360,8 @@ mod tests {
             "pgs --manager fpga",
             "pgs --board served",
             "pgs serve",
-            "pgs thesis step --collisions -1 --bodies 1",
-            "pgs thesis step --collisions 1",
+            "pgs thesis cycles --collisions -1 --bodies 1",
+            "pgs thesis cycles --collisions 1",
             "pgs solve",
             "pgs frobnicate",
         ] {

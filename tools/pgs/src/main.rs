@@ -10,14 +10,13 @@ mod a53;
 mod bug_report;
 mod cli;
 mod difference;
-mod footprint;
 #[cfg(feature = "pages")]
 mod pages;
 mod power;
 mod traced;
 mod verbs;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
@@ -29,14 +28,9 @@ use pgs_command::{environment, failure};
 
 /// Sends the log to stderr: warnings, unless the environment sets another filter.
 fn log_to_stderr() {
-    let text = |name: &str, default: &str| {
-        let found = environment::variable(name).map(|text| text.to_string_lossy().into_owned());
-        found.unwrap_or_else(|| default.to_owned())
-    };
-    env_logger::Builder::new()
-        .parse_filters(&text(environment::LOG, "warn"))
-        .parse_write_style(&text(environment::LOG_STYLE, "auto"))
-        .init();
+    let filter = environment::variable(environment::LOG);
+    let filter = filter.map_or("warn".into(), |text| text.to_string_lossy().into_owned());
+    env_logger::Builder::new().parse_filters(&filter).init();
 }
 
 /// Makes a write past the limit on the size of files (`ulimit -f`) fail with an error; by default
@@ -64,17 +58,19 @@ fn main() -> ExitCode {
 
 /// Runs the command of the command line.
 fn run() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().collect();
+    cli::color(&arguments).write_global();
     log_to_stderr();
     survive_file_limit();
     #[cfg(feature = "pages")]
     if let Some(code) = pages::generate_if_asked() {
         return code;
     }
-    let command = match cli::parse(std::env::args_os(), |name| std::env::var_os(name)) {
+    let command = match cli::parse(&arguments, |name| std::env::var_os(name)) {
         Ok(command) => command,
         Err(message) => return failure::report_usage(&message),
     };
-    let mut out = io::stdout().lock();
+    let mut out = anstream::stdout().lock();
     let done = command
         .verb
         .run(&command.common, &mut out)
@@ -85,7 +81,7 @@ fn run() -> ExitCode {
             if command.common.json {
                 failure.write_document(&mut out);
             }
-            failure.report(&mut io::stderr().lock())
+            failure.report(&mut anstream::stderr().lock())
         }
     }
 }

@@ -45,7 +45,7 @@ pub(crate) fn generate_if_asked() -> Option<ExitCode> {
                     "name a folder with --out that may be written to; {} may not",
                     out.display()
                 ))
-                .report(&mut io::stderr().lock()),
+                .report(&mut anstream::stderr().lock()),
         },
     })
 }

@@ -39,16 +39,30 @@ async function view(page, { measure, screenshot }) {
 	assert.notEqual(start, end, "the scrub bar changes the picture");
 	assert.equal(await page.textContent("#play"), "Play", "the scrub bar stops the playing");
 
+	const kinds = await page.evaluate(() => window.player.recording.head.kinds.length);
+	assert.equal(await page.inputValue("#colour"), kinds > 1 ? "kind" : "speed", "several kinds have their colours");
+	const facts = await page.textContent("dl");
+	for (const fact of ["profile", "passes of a step", "ms a step on the board (modelled)"]) {
+		assert.ok(facts.includes(fact), `the page tells ${fact}: ${facts}`);
+	}
+	const shadowed = await pixels(page);
+	await page.evaluate(() => { window.player.painter.drawShadows = () => {}; });
+	const plain = await pixels(page);
+	await page.evaluate(() => { delete window.player.painter.drawShadows; });
+	assert.notEqual(shadowed, plain, "bodies have shadows on the ground");
+
 	const seen = new Set();
 	await at(page, 0.6);
-	for (const colour of ["speed", "rest", "start"]) {
+	for (const colour of ["kind", "speed", "start"]) {
 		await page.selectOption("#colour", colour);
 		seen.add(await pixels(page));
 	}
 	assert.equal(seen.size, 3, "each colouring is another picture");
 	await page.focus("#picture");
 	await page.keyboard.press("c");
-	assert.equal(await page.inputValue("#colour"), "speed", "the key C goes on to the first colouring");
+	assert.equal(await page.inputValue("#colour"), "kind", "the key C goes on to the first colouring");
+	assert.equal(await page.isVisible("#legend-scale"), false, "kinds have no scale");
+	assert.ok(await page.locator("#legend-kinds span").count() > 0, "the legend names each kind");
 
 	const before = await pixels(page);
 	await page.keyboard.press("ArrowLeft");
@@ -87,6 +101,30 @@ async function view(page, { measure, screenshot }) {
 	assert.match(download.suggestedFilename(), /^zynq-pgs-.*\.png$/);
 	await at(page, 1);
 	await screenshot();
+}
+
+// The page of `pgs run --live`, opened while the run goes on.
+async function live(page, { screenshot }) {
+	await page.waitForFunction(() => window.player, null, { timeout: 60000 });
+	const last = () => page.evaluate(() => [window.player.live, window.player.end]);
+	const [isLive, before] = await last();
+	assert.ok(isLive, "the run goes on");
+	for (let frames = 0, time = before; frames < 20; frames++) {
+		await page.waitForFunction(time => window.player.end > time, time, { timeout: 30000 });
+		time = (await last())[1];
+	}
+	assert.match(await page.textContent("#state"), /^Live: step [0-9]+, [0-9.]+ ms a step on the board \(modelled\)$/);
+	await page.waitForFunction(() => window.player.time === window.player.end, null, { timeout: 30000 });
+	assert.ok(colours(await pixels(page)) > 10, "the picture is not uniform");
+	await screenshot();
+	await page.focus("#picture");
+	await page.keyboard.press(",");
+	const stopped = await page.evaluate(() => window.player.time);
+	await page.waitForFunction(time => window.player.end > time + 0.2, stopped, { timeout: 30000 });
+	assert.equal(await page.evaluate(() => window.player.time), stopped, "an earlier frame stays in view");
+	await page.keyboard.press(" ");
+	await page.waitForFunction(time => window.player.time > time, stopped, { timeout: 30000 });
+	assert.ok((await last())[0], "the run still goes on");
 }
 
 // The figures of the thesis that the report draws, and the recorded numbers that it sets beside ours.
@@ -147,4 +185,4 @@ async function report(page, { screenshot }) {
 	await player.waitForFunction(() => window.player && window.player.pictures > 2, null, { timeout: 60000 });
 }
 
-module.exports = { report, view };
+module.exports = { live, report, view };

@@ -5,6 +5,8 @@ use std::io::Write;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs, Given};
 use pgs_command::failure::{Failure, Result, Verdict};
+use pgs_command::options::build::ThreadsArgs;
+use pgs_command::output::width::terminal;
 use serde_json::json;
 
 use crate::experiment::{Boards, Experiment, SCHEMA};
@@ -17,7 +19,8 @@ use crate::{compare, detect, formats, formulas, order, study};
 const EXAMPLES: &str = "\
 Examples:
   pgs thesis                                    the list of experiments
-  pgs thesis step --collisions 127000 --bodies 38880
+  pgs thesis step                               the headline: two designs, time and energy
+  pgs thesis cycles --collisions 90000 --bodies 38880
   pgs thesis determinism --input tests/golden/pile5_step60
   pgs thesis ladder --markdown
   pgs thesis --all --out report                 all of them: one page, Markdown, JSON, figures
@@ -48,6 +51,7 @@ pub(crate) fn experiments() -> Vec<&'static Experiment> {
         &study::split::SPLIT,
         &study::pile::PILE,
         &study::stages::STAGES,
+        &study::step::STEP,
         &study::determinism::ORDERS,
         &study::half::HALF,
         &study::ladder::LADDER,
@@ -72,9 +76,9 @@ impl Args for ThesisArgs {
             let command = match experiment.boards {
                 Boards::None => command,
                 Boards::Own => AcceleratorOptions::augment_args(command),
-                Boards::Any => {
-                    AcceleratorOptions::augment_args(BoardOptions::augment_args(command))
-                }
+                Boards::Any => AcceleratorOptions::augment_args(ThreadsArgs::augment_args(
+                    BoardOptions::augment_args(command),
+                )),
             };
             // Last, because options bring texts of their own.
             command.about(experiment.about).long_about(None)
@@ -134,6 +138,7 @@ impl ThesisArgs {
             board: has(Boards::Any).and_then(|_| BoardOptions::from_arg_matches(options).ok()),
             accelerator: has(Boards::Own)
                 .and_then(|_| AcceleratorOptions::from_arg_matches(options).ok()),
+            threads: options.try_get_one("threads").ok().flatten().copied(),
             manager: None,
         }
     }
@@ -176,7 +181,7 @@ fn list(common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
             });
             writeln!(out, "{document:#}")?;
         }
-        false => write!(out, "{}", table.to_text(usize::MAX))?,
+        false => write!(out, "{}", table.to_text(usize::MAX, terminal()))?,
     }
     Ok(Verdict::Done)
 }
@@ -203,6 +208,7 @@ pub(crate) mod tests {
             "time-step --grid 2x2x2",
             "stopping --grid 2x2x2",
             "split --grid 2x2x2",
+            "step --grid 2x2x2",
             "determinism --grid 2x2x2",
             "half --grid 2x2x2 --build half",
             "compare float half --grid 2x2x2",

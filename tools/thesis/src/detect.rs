@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use bitstream_model::BoardConfig;
 use clap::Args;
 use scene::{Scene, penetration};
-use zynq_pgs::emulation::Build;
 use zynq_pgs::{Collision, Contact};
 
 use crate::experiment::{Boards, Experiment, Measure, Part};
@@ -86,7 +86,7 @@ impl Measure for DetectionArgs {
 
 /// Lets the driver refuse collisions that are none. The solution is not used.
 fn check(step: &GivenStep, session: &Session) -> Result<()> {
-    let mut opened = board::open(&session.emulated(), &Build::default())?;
+    let mut opened = board::open(&session.emulated(), BoardConfig::default())?;
     let mut solve = || {
         step_input::set_shapes(&mut opened.accelerator, &step.shapes)?;
         let (mut bodies, once) = (step.bodies.clone(), step.parameters.with_contact_iterations(1));

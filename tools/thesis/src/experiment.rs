@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::facts::fact;
-use pgs_command::output::width::stdout_width;
+use pgs_command::output::width::{stdout_width, terminal};
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
@@ -15,7 +15,10 @@ use crate::session::Session;
 use crate::table::{Table, text};
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
-pub(crate) const SCHEMA: u32 = 4;
+pub(crate) const SCHEMA: u32 = 5;
+
+/// The figure that opens the page of all experiments.
+pub(crate) const PILES: &str = "piles";
 
 /// The last line of an outcome that Ctrl-C has cut short.
 pub(crate) const INTERRUPTED: &str = "interrupted: the figures are of the steps before Ctrl-C";
@@ -123,9 +126,10 @@ impl Part {
         self.rows.append(&mut other.rows);
     }
 
-    /// Sorts by the sections of the thesis; within one, figures and rows keep their order.
+    /// Sorts by the sections of the thesis; within one, figures and rows keep their order. The
+    /// piles of the headline come first.
     pub(crate) fn sort(&mut self) {
-        self.figures.sort_by_key(|figure| section_key(figure.thesis));
+        self.figures.sort_by_key(|figure| (figure.id != PILES, section_key(figure.thesis)));
         self.rows.sort_by_key(|row| section_key(&row.thesis));
     }
 
@@ -176,7 +180,7 @@ impl Part {
             fact(out, label, text)?;
         }
         for table in self.tables.iter().chain(&self.index()) {
-            write!(out, "\n{}", table.to_text(stdout_width()))?;
+            write!(out, "\n{}", table.to_text(stdout_width(), terminal()))?;
         }
         if !self.complete && self.agrees {
             writeln!(out, "{INTERRUPTED}")?;

@@ -3,7 +3,7 @@
 use indicatif::ProgressBar;
 
 use pgs_command::board::OpenBoard;
-use pgs_command::common::{BoardName, CommonArgs};
+use pgs_command::common::CommonArgs;
 use pgs_command::interrupt::Interrupt;
 use pgs_command::output::progress::progress_bar;
 
@@ -31,7 +31,7 @@ impl Session {
 
     /// The options with the emulated board, for experiments that build their boards themselves.
     pub(crate) fn emulated(&self) -> CommonArgs {
-        CommonArgs { board: BoardName::Emulated, ..self.common.clone() }
+        CommonArgs { board: CommonArgs::emulated().board, ..self.common.clone() }
     }
 
     /// Announces further steps.

@@ -19,13 +19,13 @@ fn step(
     let options = SceneOptions { grid, drop: 0.0 };
     let mut scene = Scene::new(&options).expect("a scene");
     let build = Build { profile: Some(profile), bandwidth: Some(bandwidth), ..Build::default() };
-    let board = BoardChoice::Built(build.config());
+    let board = BoardChoice::Built(build);
     let mut accelerator =
         Accelerator::open(OpenOptions { board, ..OpenOptions::default() }).expect("a board");
     accelerator.set_shapes(scene.shapes()).expect("shapes");
     scene.detect();
     let (bodies, collisions) = scene.parts_mut();
-    let parameters = StepParameters::default().with_order(Some(Order::AsGiven));
+    let parameters = StepParameters::thesis().with_order(Some(Order::AsGiven));
     let report = accelerator.step(bodies, collisions, &parameters).expect("a step");
     let shape = StepShape {
         contact_iterations: parameters.contact_iterations.into(),

@@ -63,7 +63,7 @@ pub enum ViewError {
     /// More kinds of bodies than a byte can tell apart.
     #[error(
         "expected at most {most} kinds of bodies on a page, found {found}: record fewer bodies, \
-         or write them as glTF"
+         or write them as arrays"
     )]
     TooManyKinds {
         /// The kinds of the recording.
@@ -96,6 +96,14 @@ pub enum ViewError {
         side: u16,
         /// The most in all.
         pixels: u32,
+    },
+    /// The page of a run cannot be served.
+    #[error("the page of the run cannot be served at {address}: give a free port of this machine")]
+    Live {
+        /// Its address.
+        address: std::net::SocketAddr,
+        /// The reason.
+        source: io::Error,
     },
     /// The poses cannot be compressed.
     #[error("the poses cannot be compressed")]

@@ -1,14 +1,13 @@
 //! Makes poses small: whole numbers, differences between frames, and a general compression.
 //!
 //! A position is a whole number of quanta from the lowest corner of all positions. A quaternion
-//! is its three smallest components and the index of the largest. A speed is the distance
-//! from the last frame over the time between: 0 below [`SLOWEST`], otherwise the root of its share
-//! of the largest speed. The page's `decode.js` undoes each step.
+//! is its three smallest components and the index of the largest. The page's `decode.js` undoes each
+//! step.
 //!
 //! In the order of the bytes: for each frame, for each of the six numbers of a body, the difference
 //! from the last frame, zigzag coded, first the low bytes of all bodies, then the high bytes; then
-//! the index of the largest component and the speed of all bodies, each as a difference, too. At
-//! the very beginning stands each body's geometry.
+//! the index of the largest component of all bodies as a difference, too. A frame that is sent alone
+//! has the six numbers themselves, each of all bodies in a row, then the indices.
 //!
 //! Source: Glenn Fiedler: "Snapshot Compression" (2015), for the three smallest components.
 
@@ -24,11 +23,7 @@ use crate::recording::{Frame, Recording};
 /// Largest whole number of a position.
 const POSITION_MOST: f64 = 65_535.0;
 /// Largest whole number of a component of a quaternion.
-const COMPONENT_MOST: f64 = 4095.0;
-/// The slowest speed that is told from none, m/s.
-const SLOWEST: f64 = 0.05;
-/// Largest whole number of a speed.
-const SPEED_MOST: f64 = 255.0;
+pub(crate) const COMPONENT_MOST: f64 = 4095.0;
 
 /// Poses as whole numbers.
 #[derive(Debug)]
@@ -39,10 +34,6 @@ pub(crate) struct Quantised {
     pub(crate) low: [f32; 3],
     /// One quantum of a position, m.
     pub(crate) quantum: f64,
-    /// Largest number of a component.
-    pub(crate) component_most: f64,
-    /// Largest speed, m/s.
-    pub(crate) speed_most: f64,
     pub(crate) error: Error,
 }
 
@@ -166,19 +157,8 @@ fn zigzag(now: u16, before: u16) -> [u8; 2] {
     ((difference << 1) ^ negative).to_le_bytes()
 }
 
-/// Distance from one pose to the next over the time between, m/s.
-fn speeds<'a>(before: &'a Frame, now: &'a Frame) -> impl Iterator<Item = f64> + 'a {
-    let time = f64::from(now.time) - f64::from(before.time);
-    before.poses.iter().zip(&now.poses).map(move |(before, now)| {
-        let [x, y, z] = [0, 1, 2]
-            .map(|axis: usize| f64::from(now.position[axis]) - f64::from(before.position[axis]));
-        let distance = ((x * x + y * y) + z * z).sqrt();
-        if time > 0.0 { distance / time } else { 0.0 }
-    })
-}
-
 /// The kind of each body as a byte.
-fn kinds(recording: &Recording) -> Result<Vec<u8>, ViewError> {
+pub(crate) fn kinds(recording: &Recording) -> Result<Vec<u8>, ViewError> {
     let (found, most) = (recording.geometries().len(), usize::from(u8::MAX) + 1);
     let bytes = recording.kinds().iter().map(|kind| u8::try_from(*kind));
     bytes.collect::<Result<_, _>>().map_err(|_| ViewError::TooManyKinds { found, most })
@@ -188,16 +168,12 @@ fn kinds(recording: &Recording) -> Result<Vec<u8>, ViewError> {
 pub(crate) fn quantise(recording: &Recording) -> Result<Quantised, ViewError> {
     let frames = recording.frames();
     let scale = Scale::of(frames);
-    let speed_most =
-        frames.windows(2).flat_map(|pair| speeds(&pair[0], &pair[1])).fold(SLOWEST, larger);
     let bodies = recording.bodies();
     let mut error = Error::default();
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::new(6));
     let mut put = |bytes: &[u8]| encoder.write_all(bytes).map_err(ViewError::Compression);
-    put(&kinds(recording)?)?;
     let mut before: Vec<Numbers> = vec![([0; 6], 0); bodies];
-    let mut speed_before = vec![0_u8; bodies];
-    for (index, frame) in frames.iter().enumerate() {
+    for frame in frames {
         let now: Vec<Numbers> = frame.poses.iter().map(|pose| scale.numbers(pose)).collect();
         for (pose, numbers) in frame.poses.iter().zip(&now) {
             let found = scale.error(pose, *numbers);
@@ -212,32 +188,24 @@ pub(crate) fn quantise(recording: &Recording) -> Result<Quantised, ViewError> {
         }
         let pairs = now.iter().zip(&before);
         put(&pairs.map(|(now, was)| now.1.wrapping_sub(was.1)).collect::<Vec<_>>())?;
-        let speed: Vec<u8> = match index.checked_sub(1) {
-            None => vec![0; bodies],
-            Some(last) => {
-                speeds(&frames[last], frame).map(|speed| speed_number(speed, speed_most)).collect()
-            }
-        };
-        let pairs = speed.iter().zip(&speed_before);
-        put(&pairs.map(|(now, was)| now.wrapping_sub(*was)).collect::<Vec<_>>())?;
-        (before, speed_before) = (now, speed);
+        before = now;
     }
     Ok(Quantised {
         bytes: encoder.finish().map_err(ViewError::Compression)?,
         low: scale.low,
         quantum: scale.quantum,
-        component_most: COMPONENT_MOST,
-        speed_most,
         error,
     })
 }
 
-fn speed_number(speed: f64, most: f64) -> u8 {
-    if speed < SLOWEST {
-        return 0;
-    }
-    let share = (speed / most).sqrt();
-    u8::try_from(whole(share * SPEED_MOST, SPEED_MOST)).unwrap_or(u8::MAX).max(1)
+/// One frame alone: its lowest corner and quantum, and its bytes.
+#[cfg(feature = "live")]
+pub(crate) fn alone(frame: &Frame) -> ([f32; 3], f64, Vec<u8>) {
+    let scale = Scale::of(std::slice::from_ref(frame));
+    let all: Vec<Numbers> = frame.poses.iter().map(|pose| scale.numbers(pose)).collect();
+    let numbers =
+        (0..6).flat_map(|k| all.iter().flat_map(move |(numbers, _)| numbers[k].to_le_bytes()));
+    (scale.low, scale.quantum, numbers.chain(all.iter().map(|(_, largest)| *largest)).collect())
 }
 
 #[cfg(test)]
@@ -248,13 +216,13 @@ mod tests {
     use std::io::Read as _;
 
     /// Undoes the compression and the differences, as the page does.
-    fn decode(found: &Quantised, frames: usize, bodies: usize) -> Vec<Vec<(Numbers, u8)>> {
+    fn decode(found: &Quantised, frames: usize, bodies: usize) -> Vec<Vec<Numbers>> {
         let mut raw = Vec::new();
         let mut decoder = flate2::read::DeflateDecoder::new(&found.bytes[..]);
         decoder.read_to_end(&mut raw).expect("deflated");
-        assert_eq!(raw.len(), bodies * (1 + 14 * frames));
-        let mut planes = raw[bodies..].chunks(bodies);
-        let mut state = vec![(([0_u16; 6], 0_u8), 0_u8); bodies];
+        assert_eq!(raw.len(), bodies * 13 * frames);
+        let mut planes = raw.chunks(bodies);
+        let mut state = vec![([0_u16; 6], 0_u8); bodies];
         let mut decoded = Vec::new();
         for _ in 0..frames {
             for k in 0..6 {
@@ -262,14 +230,13 @@ mod tests {
                 for body in 0..bodies {
                     let coded = u16::from_le_bytes([low[body], high[body]]);
                     let negative = if coded & 1 == 1 { u16::MAX } else { 0 };
-                    let number = &mut state[body].0.0[k];
+                    let number = &mut state[body].0[k];
                     *number = number.wrapping_add((coded >> 1) ^ negative);
                 }
             }
-            let (largest, speed) = (planes.next().expect("largest"), planes.next().expect("speed"));
+            let largest = planes.next().expect("largest");
             for body in 0..bodies {
-                state[body].0.1 = state[body].0.1.wrapping_add(largest[body]);
-                state[body].1 = state[body].1.wrapping_add(speed[body]);
+                state[body].1 = state[body].1.wrapping_add(largest[body]);
             }
             decoded.push(state.clone());
         }
@@ -283,7 +250,7 @@ mod tests {
         let scale = Scale { low: found.low, quantum: found.quantum };
         let mut largest = Error::default();
         for (frame, decoded) in recording.frames().iter().zip(decode(&found, 6, 18)) {
-            for (pose, (numbers, _)) in frame.poses.iter().zip(decoded) {
+            for (pose, numbers) in frame.poses.iter().zip(decoded) {
                 let error = scale.error(pose, numbers);
                 largest.distance = larger(largest.distance, error.distance);
                 largest.angle = larger(largest.angle, error.angle);
@@ -312,27 +279,23 @@ mod tests {
         assert!((scale.error(&pose, none).angle - 90.0).abs() < 0.1);
     }
 
+    #[cfg(feature = "live")]
     #[test]
-    fn speeds_tell_rest_from_motion() {
+    fn a_frame_alone_has_the_numbers_of_its_poses() {
         let recording = fixture(6);
-        let found = quantise(&recording).expect("six kinds");
-        let decoded = decode(&found, 6, 18);
-        // The first three bodies stay where they are; the others fall ever faster.
-        for (body, (_, speed)) in decoded[5].iter().enumerate() {
-            assert_eq!(*speed == 0, body < 3, "{body}: {speed}");
+        let frame = &recording.frames()[5];
+        let (low, quantum, bytes) = alone(frame);
+        assert_eq!(bytes.len(), 13 * 18);
+        let scale = Scale { low, quantum };
+        for (body, pose) in frame.poses.iter().enumerate() {
+            let number = |k: usize| {
+                let at = 2 * (18 * k + body);
+                u16::from_le_bytes([bytes[at], bytes[at + 1]])
+            };
+            let numbers = [0, 1, 2, 3, 4, 5].map(number);
+            let error = scale.error(pose, (numbers, bytes[12 * 18 + body]));
+            assert!(error.distance <= 0.87 * quantum + 1e-6 && error.angle < 0.08, "{error:?}");
         }
-        assert!(decoded[5].iter().any(|(_, speed)| *speed == 255));
-        assert!(decoded[0].iter().all(|(_, speed)| *speed == 0));
-    }
-
-    #[test]
-    fn a_speed_beyond_f32_is_a_number() {
-        let pose = |y| Pose { position: [0.0, y, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
-        let frame = |step, time, y| Frame { step, time, poses: vec![pose(y)] };
-        let (before, now) = (frame(0, 0.0, -f32::MAX), frame(1, 0.001, f32::MAX));
-        let speed = speeds(&before, &now).next().expect("a body");
-        assert!(speed.is_finite() && speed > 6e41, "{speed}");
-        assert_eq!(speed_number(speed, speed), u8::MAX);
     }
 
     #[test]
@@ -349,10 +312,10 @@ mod tests {
             recording.add(0, 0.0, &bodies).expect("finite poses");
             recording
         };
-        quantise(&recording(256)).expect("as many as a byte has");
-        let said = quantise(&recording(257)).expect_err("too many").to_string();
+        kinds(&recording(256)).expect("as many as a byte has");
+        let said = kinds(&recording(257)).expect_err("too many").to_string();
         assert!(said.contains("at most 256 kinds of bodies on a page, found 257"), "{said}");
-        crate::gltf::binary(&recording(257)).expect("glTF has indices of its own");
+        crate::npz::bytes(&recording(257)).expect("arrays have whole words");
     }
 
     #[test]

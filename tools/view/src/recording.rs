@@ -57,6 +57,13 @@ impl Recording {
         if self.frames.last().is_some_and(|frame| frame.time.to_bits() == time.to_bits()) {
             return Ok(());
         }
+        let frame = self.alone(step, time, bodies)?;
+        self.frames.push(frame);
+        Ok(())
+    }
+
+    /// The frame that [`add`](Self::add) adds.
+    pub(crate) fn alone(&self, step: u32, time: f32, bodies: &[Body]) -> Result<Frame, ViewError> {
         if !time.is_finite() {
             return Err(ViewError::Time { step, found: time });
         }
@@ -67,8 +74,7 @@ impl Recording {
             is_shown(&pose).then_some(pose).ok_or(ViewError::Pose { step, body: *index, pose })
         };
         let poses = self.bodies.iter().enumerate().map(pose).collect::<Result<_, _>>()?;
-        self.frames.push(Frame { step, time, poses });
-        Ok(())
+        Ok(Frame { step, time, poses })
     }
 
     /// The number of moving bodies.

@@ -101,7 +101,7 @@ fn count(options: &Options, function: &str) -> Result<(f64, StepParameters, f64)
     let [collisions, contact, friction] = numbers[..] else {
         return Err(format!("three numbers are expected, found {text:?}").into());
     };
-    let mut parameters = StepParameters::default();
+    let mut parameters = StepParameters::thesis();
     (parameters.contact_iterations, parameters.friction_iterations) = (contact, friction);
     let collected = log.lines().find_map(|line| line.split_once("Collected :"));
     let (_, collected) = collected.ok_or("callgrind does not report its counts")?;

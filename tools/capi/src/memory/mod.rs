@@ -7,6 +7,7 @@
 
 #![allow(unsafe_code, reason = "the memory of a C caller is reached by raw pointers alone")]
 
+mod column;
 mod overlap;
 mod pointer;
 mod sized;
@@ -14,5 +15,5 @@ mod view;
 
 pub(crate) use overlap::{Span, refuse_overlap};
 pub(crate) use pointer::{close, handle, open_into, slice, store, text};
-pub(crate) use sized::{Out, read};
+pub(crate) use sized::{Out, read, span};
 pub(crate) use view::{BodiesView, CollisionsView, store_impulses};

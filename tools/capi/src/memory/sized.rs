@@ -44,12 +44,13 @@ unsafe impl Growing for Report {
 }
 const _: () = assert!(size_of::<Report>() == size_of::<usize>() + 9 * 8);
 
-// SAFETY: `repr(C)`, two `usize` and five pairs of a raw pointer and a `usize`.
+// SAFETY: `repr(C)`, two `usize`, six pairs of a raw pointer and a `usize`, a `usize` and three
+// numbers of 64 bits.
 unsafe impl Growing for BodyArrays {
     const NAME: &'static str = "zpgs_bodies";
-    const FIRST: usize = size_of::<Self>();
+    const FIRST: usize = offset_of!(Self, table);
 }
-const _: () = assert!(size_of::<BodyArrays>() == 12 * size_of::<usize>());
+const _: () = assert!(size_of::<BodyArrays>() == 15 * size_of::<usize>() + 3 * 8);
 
 // SAFETY: `repr(C)`, two `usize`, two pairs of a raw pointer and a `usize`, a raw pointer and two
 // numbers of 32 bits.
@@ -79,6 +80,19 @@ unsafe fn size_in<T: Growing>(pointer: NonNull<T>) -> Result<usize, Failure> {
     // SAFETY: aligned as a `T`, which begins with a `usize`; the caller promises its memory.
     let size = unsafe { pointer.cast::<usize>().read() };
     check_size::<T>(size).map(|()| size)
+}
+
+/// The bytes of a structure, as many as the caller's has; none for null.
+///
+/// # Safety
+/// As [`read`].
+pub(crate) unsafe fn span<T: Growing>(pointer: *const T) -> Span {
+    let whole = Span::of(T::NAME, pointer);
+    match checked(pointer, T::NAME) {
+        // SAFETY: the caller promises the first field.
+        Ok(pointer) => unsafe { size_in(pointer) }.map_or(whole, |size| whole.of_size(size)),
+        Err(_) => whole,
+    }
 }
 
 /// Reads a structure; a field that the caller's structure lacks comes from `defaults`.

@@ -1,133 +1,68 @@
 //! Views of the caller's arrays that the driver takes as bodies and collisions.
 
-use std::ptr::NonNull;
-
 use zynq_pgs::scene::Structures;
 use zynq_pgs::{Bodies, Body, Collision, Collisions, Impulses, Place, Pose, Velocity};
 
+use super::column::{Column, Numbers};
 use super::overlap::Span;
-use super::pointer::{extent, misaligned, slice};
-use crate::arrays::{BodyArrays, CollisionArray, Strided, StridedConst};
+use super::pointer::slice;
+use crate::arrays::{BodyArrays, CollisionArray, Strided};
 use crate::failure::Failure;
-
-/// One strided array.
-///
-/// Invariant: for every index below the count it was made with, `first` plus the index times the
-/// stride is aligned and leads to an element in the caller's memory.
-#[derive(Debug)]
-struct Column<T> {
-    name: &'static str,
-    first: NonNull<T>,
-    stride: usize,
-}
-
-impl<T: Copy> Column<T> {
-    /// Checks the address, the stride and the extent of an array.
-    ///
-    /// # Safety
-    /// `data` is null or leads to `count` elements, `stride` bytes apart, which live as long as the
-    /// column is in use. Every bit pattern is a `T`.
-    unsafe fn new(data: StridedConst, count: usize, name: &'static str) -> Result<Self, Failure> {
-        let StridedConst { data, stride } = data;
-        if count == 0 {
-            return Ok(Self { name, first: NonNull::dangling(), stride: 0 });
-        }
-        let first = NonNull::new(data.cast_mut()).ok_or_else(|| Failure::null(name))?.cast::<T>();
-        if !first.is_aligned() {
-            return Err(misaligned(name, first.addr().get(), align_of::<T>()));
-        }
-        if stride < size_of::<T>() || !stride.is_multiple_of(align_of::<T>()) {
-            return Err(Failure::argument(format!(
-                "the stride of the {name} is {stride} bytes: give a multiple of {}, at least {}",
-                align_of::<T>(),
-                size_of::<T>()
-            )));
-        }
-        extent(first.addr().get(), stride, size_of::<T>(), count, name)?;
-        Ok(Self { name, first, stride })
-    }
-
-    /// Its bytes.
-    fn span(&self, count: usize) -> Span {
-        Span::new::<T>(self.name, self.first.addr().get(), self.stride, count)
-    }
-
-    /// The address of an element.
-    ///
-    /// # Safety
-    /// `index` is below the count.
-    unsafe fn at(&self, index: usize) -> NonNull<T> {
-        // SAFETY: the element is in the caller's memory (the invariant), and the offset to it does
-        // not overflow: `extent` has checked the last one.
-        unsafe { self.first.byte_add(index * self.stride) }
-    }
-
-    /// An element.
-    ///
-    /// # Safety
-    /// `index` is below the count, the element is initialised, and no other thread writes it.
-    unsafe fn get(&self, index: usize) -> T {
-        // SAFETY: the caller promises the index.
-        let element = unsafe { self.at(index) };
-        // SAFETY: aligned and in the caller's memory (the invariant), and initialised; nothing
-        // writes it.
-        unsafe { element.read() }
-    }
-
-    /// Replaces an element.
-    ///
-    /// # Safety
-    /// `index` is below the count, and nothing else reads or writes the element.
-    unsafe fn set(&mut self, index: usize, value: T) {
-        // SAFETY: the caller promises the index.
-        let element = unsafe { self.at(index) };
-        // SAFETY: aligned and in the caller's memory (the invariant), which is writable and which
-        // nothing else reads or writes.
-        unsafe { element.write(value) };
-    }
-}
-
-impl From<Strided> for StridedConst {
-    fn from(Strided { data, stride }: Strided) -> Self {
-        Self { data, stride }
-    }
-}
+use crate::shape::Shape;
 
 /// The caller's bodies.
 #[derive(Debug)]
-pub(crate) struct BodiesView {
+pub(crate) struct BodiesView<'a> {
     count: usize,
-    positions: Column<[f32; 3]>,
-    orientations: Column<[f32; 4]>,
-    linear_velocities: Column<[f32; 3]>,
-    angular_velocities: Column<[f32; 3]>,
+    positions: Numbers<3>,
+    orientations: Numbers<4>,
+    linear_velocities: Numbers<3>,
+    angular_velocities: Numbers<3>,
     shapes: Column<u32>,
+    /// The shapes of the world, if it brings them.
+    pub(crate) table: Option<&'a [Shape]>,
+    origin: [f64; 3],
 }
 
-impl BodiesView {
+impl BodiesView<'_> {
     /// Checks the arrays.
     ///
     /// # Safety
     /// Each array is as [`BodyArrays`] describes, initialised, and lives as long as the view is in
     /// use. Nothing but the view writes the arrays meanwhile.
     pub(crate) unsafe fn new(arrays: BodyArrays) -> Result<Self, Failure> {
-        let BodyArrays { count, shapes, .. } = arrays;
+        let BodyArrays { count, shapes, table, table_count, number_size: size, origin, .. } =
+            arrays;
         let BodyArrays { positions, orientations, linear_velocities, angular_velocities, .. } =
             arrays;
         // SAFETY: the caller promises each array, here and below; floats and integers take every
         // bit pattern.
-        let positions = unsafe { Column::new(positions.into(), count, "positions") }?;
+        let positions = unsafe { Numbers::new(positions, count, size, "positions") }?;
         // SAFETY: as above.
-        let orientations = unsafe { Column::new(orientations.into(), count, "orientations") }?;
+        let orientations = unsafe { Numbers::new(orientations, count, size, "orientations") }?;
         // SAFETY: as above.
         let linear_velocities =
-            unsafe { Column::new(linear_velocities.into(), count, "linear velocities") }?;
+            unsafe { Numbers::new(linear_velocities, count, size, "linear velocities") }?;
         // SAFETY: as above.
         let angular_velocities =
-            unsafe { Column::new(angular_velocities.into(), count, "angular velocities") }?;
+            unsafe { Numbers::new(angular_velocities, count, size, "angular velocities") }?;
         // SAFETY: as above.
         let shapes = unsafe { Column::new(shapes, count, "shapes of the bodies") }?;
-        Ok(Self { count, positions, orientations, linear_velocities, angular_velocities, shapes })
+        let table = match table_count {
+            0 => None,
+            // SAFETY: as above; every bit pattern is a shape.
+            _ => Some(unsafe { slice(table, table_count, "shapes of the world") }?),
+        };
+        Ok(Self {
+            count,
+            positions,
+            orientations,
+            linear_velocities,
+            angular_velocities,
+            shapes,
+            table,
+            origin,
+        })
     }
 
     /// The arrays that a step writes.
@@ -142,9 +77,12 @@ impl BodiesView {
         ]
     }
 
-    /// The array that a step only reads.
-    pub(crate) fn input(&self) -> Span {
-        self.shapes.span(self.count)
+    /// The arrays that a step only reads.
+    pub(crate) fn inputs(&self) -> [Span; 2] {
+        let table = self.table.unwrap_or_default();
+        let (first, stride) = (table.as_ptr().addr(), size_of::<Shape>());
+        let table = Span::new::<Shape>("shapes of the world", first, stride, table.len());
+        [self.shapes.span(self.count), table]
     }
 
     /// Makes sure that an index is below the count, as the driver promises.
@@ -154,9 +92,9 @@ impl BodiesView {
 }
 
 // SAFETY: a shared view only reads, and nothing else writes the arrays while it is in use (`new`).
-unsafe impl Sync for BodiesView {}
+unsafe impl Sync for BodiesView<'_> {}
 
-impl Bodies for BodiesView {
+impl Bodies for BodiesView<'_> {
     fn len(&self) -> usize {
         self.count
     }
@@ -164,13 +102,13 @@ impl Bodies for BodiesView {
     fn body(&self, index: usize) -> Body {
         self.check(index);
         // SAFETY: the index is below the count, and a shared view has no writer; both hold below.
-        let position = unsafe { self.positions.get(index) };
+        let position = unsafe { self.positions.get(index, self.origin) };
         // SAFETY: as above.
-        let orientation = unsafe { self.orientations.get(index) };
+        let orientation = unsafe { self.orientations.get(index, [0.0; 4]) };
         // SAFETY: as above.
-        let linear = unsafe { self.linear_velocities.get(index) };
+        let linear = unsafe { self.linear_velocities.get(index, [0.0; 3]) };
         // SAFETY: as above.
-        let angular = unsafe { self.angular_velocities.get(index) };
+        let angular = unsafe { self.angular_velocities.get(index, [0.0; 3]) };
         // SAFETY: as above.
         let shape = unsafe { self.shapes.get(index) };
         let pose = Pose { position, orientation };
@@ -181,13 +119,13 @@ impl Bodies for BodiesView {
         self.check(index);
         // SAFETY: the index is below the count, and the view is borrowed by this call alone; both
         // hold below.
-        unsafe { self.positions.set(index, pose.position) };
+        unsafe { self.positions.set(index, pose.position, self.origin) };
         // SAFETY: as above.
-        unsafe { self.orientations.set(index, pose.orientation) };
+        unsafe { self.orientations.set(index, pose.orientation, [0.0; 4]) };
         // SAFETY: as above.
-        unsafe { self.linear_velocities.set(index, velocity.linear) };
+        unsafe { self.linear_velocities.set(index, velocity.linear, [0.0; 3]) };
         // SAFETY: as above.
-        unsafe { self.angular_velocities.set(index, velocity.angular) };
+        unsafe { self.angular_velocities.set(index, velocity.angular, [0.0; 3]) };
     }
 }
 
@@ -298,6 +236,7 @@ impl Collisions for CollisionsView<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arrays::StridedConst;
     use zynq_pgs::Contact;
 
     /// Three bodies of 16 words: position, orientation, both velocities, shape, two words between.
@@ -316,6 +255,7 @@ mod tests {
             linear_velocities: column(8),
             angular_velocities: column(11),
             shapes: StridedConst { data: shapes.as_ptr().cast(), stride: 4 },
+            ..BodyArrays::default()
         }
     }
 

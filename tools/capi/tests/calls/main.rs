@@ -16,3 +16,4 @@ mod pushed;
 mod refusals;
 mod step;
 mod support;
+mod worlds;

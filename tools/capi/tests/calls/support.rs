@@ -55,13 +55,13 @@ pub(crate) fn arrays(bodies: &mut [Crate]) -> BodyArrays {
         |offset: usize| Strided { data: first.cast::<u8>().wrapping_add(offset).cast(), stride };
     let shapes = column(std::mem::offset_of!(Crate, shape));
     BodyArrays {
-        size: size_of::<BodyArrays>(),
         count: bodies.len(),
         positions: column(std::mem::offset_of!(Crate, position)),
         orientations: column(std::mem::offset_of!(Crate, orientation)),
         linear_velocities: column(std::mem::offset_of!(Crate, linear)),
         angular_velocities: column(std::mem::offset_of!(Crate, angular)),
         shapes: StridedConst { data: shapes.data, stride },
+        ..BodyArrays::default()
     }
 }
 

@@ -18,15 +18,22 @@ pub fn external_accelerator(
     config: &mut BoardConfig,
     accelerator: &AcceleratorChoice,
 ) -> Result<Option<Box<dyn ExternalAccelerator>>> {
-    let Some((path, with_model)) = accelerator.simulator() else { return Ok(None) };
+    let Some((path, with_model)) = &accelerator.simulator else { return Ok(None) };
     let simulator = SimulatorProcess::start_for(config, path).map_err(|error| {
         let next = match error {
-            ExternalError::Profile { .. } => "leave out --profile, or --accelerator".to_owned(),
+            ExternalError::Profile { .. } => {
+                "name another profile with --board, or leave out --accelerator".to_owned()
+            }
             ExternalError::Hazards { simulator, .. } => {
-                format!("add --hazards {simulator}, or build the simulator with --hazards")
+                format!(
+                    "add the word {simulator} to the board, or build the simulator with --hazards"
+                )
             }
             ExternalError::Inertia { simulator, board } => {
-                format!("add --inertia {simulator}, or build the simulator with --inertia {board}")
+                format!(
+                    "add the word {simulator} to the board, or build the simulator with --inertia \
+                     {board}"
+                )
             }
             _ => return Failure::input(error),
         };

@@ -8,29 +8,28 @@ use std::sync::Once;
 use bitstream_model::interface::address_map::{UIO_CONTROL_NODE, UIO_NODE};
 use bitstream_model::interface::number::Numbers;
 use bitstream_model::interface::profile::{PROFILES, Variant};
-use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard, Hazards};
+use bitstream_model::{BoardConfig, ConfigError, EmulatedBoard};
 use serde_json::{Value, json};
 use zynq_pgs::board::BoardKind;
-use zynq_pgs::emulation::Build;
-use zynq_pgs::platform::{DevMemWindows, MemoryChoice};
+use zynq_pgs::platform::MemoryChoice;
 use zynq_pgs::platform::{System, uio_listing};
 use zynq_pgs::validate::Excess;
 use zynq_pgs::{Accelerator, BoardChoice, Fault, OpenOptions, StepParameters};
 
 use self::accelerator::dead;
 pub use self::accelerator::{emulated_board, external_accelerator};
-use crate::common::{BoardName, CommonArgs};
+use crate::common::CommonArgs;
 use crate::diagnosis;
 use crate::environment::MEMORY;
 use crate::failure::{Cause, Failure, Result};
-use crate::options::bandwidth::{bandwidth_number, bandwidth_text};
-use crate::options::build::{board_option, described};
+use crate::options::bandwidth::bandwidth_text;
+use crate::options::build::described;
 use crate::options::planned::{Injected, PlannedArgs};
 use crate::output::facts::fact;
 
 /// Next step for bodies whose inertia is too general for the board.
 const WORLD_INERTIA: &str =
-    "build the board with --inertia world (in a text for `pgs thesis compare`: the word world)";
+    "add the word world to the text of the board, as --board emulated:float,world";
 
 /// An open board.
 #[derive(Debug)]
@@ -57,14 +56,14 @@ pub fn kind_text(kind: BoardKind) -> &'static str {
     }
 }
 
-/// The kind of board that a name on the command line means on this system, and why.
-pub fn choose(name: &BoardName, system: &System) -> (BoardKind, String) {
-    let kind = match name {
-        BoardName::Uio(_) => BoardKind::Uio,
-        BoardName::Devmem => BoardKind::DevMem,
-        BoardName::Emulated => BoardKind::Emulated,
-        BoardName::Socket(_) => BoardKind::Served,
-        BoardName::Auto => return find_kind(system),
+/// The kind of board that a choice means on this system, and why.
+pub fn choose(board: &BoardChoice, system: &System) -> (BoardKind, String) {
+    let kind = match board {
+        BoardChoice::Automatic => return find_kind(system),
+        BoardChoice::Uio { .. } => BoardKind::Uio,
+        BoardChoice::DevMem(_) => BoardKind::DevMem,
+        BoardChoice::Served { .. } => BoardKind::Served,
+        _ => BoardKind::Emulated,
     };
     (kind, "as asked for".to_owned())
 }
@@ -96,7 +95,7 @@ fn find_kind(system: &System) -> (BoardKind, String) {
 /// Fails where there is no real board and none was named.
 pub fn require(common: &CommonArgs) -> Result<()> {
     let (kind, reason) = choose(&common.board, &System::default());
-    if kind != BoardKind::Emulated || common.board != BoardName::Auto {
+    if kind != BoardKind::Emulated || !matches!(common.board, BoardChoice::Automatic) {
         return Ok(());
     }
     Err(Failure::new(Cause::NoBoard, format!("there is no board: {reason}")).next(
@@ -118,22 +117,18 @@ pub struct ChosenBoard {
     pub reason: String,
 }
 
-/// Chooses a board. `given` is an option of the command line that only an emulated board has.
+/// Chooses a board; an emulated one is built as `config` says.
 ///
 /// # Errors
 ///
 /// Fails where the options exclude each other, or no board is built as `config` says.
-pub fn find(
-    common: &CommonArgs,
-    config: BoardConfig,
-    given: Option<String>,
-) -> Result<ChosenBoard> {
-    let CommonArgs { board: name, memory, memory_of_environment, manager, .. } = common;
-    let (kind, reason) = choose(name, &System::default());
+pub fn find(common: &CommonArgs, config: BoardConfig) -> Result<ChosenBoard> {
+    let CommonArgs { board, memory, memory_of_environment, manager, .. } = common;
+    let (kind, reason) = choose(board, &System::default());
     let (board, observer) = if kind == BoardKind::Emulated {
         // `PGS_MEMORY` describes real boards; it does not matter to an emulated board asked for by
         // name.
-        let ignored = *memory_of_environment && *name == BoardName::Emulated;
+        let ignored = *memory_of_environment && matches!(board, BoardChoice::Built(_));
         if *memory != MemoryChoice::Automatic && !ignored {
             let (option, next) = match memory_of_environment {
                 true => (MEMORY, "choose the board with --board emulated or --board uio"),
@@ -146,24 +141,10 @@ pub fn find(
         }
         let emulated = emulated_board(config, &common.accelerator)?;
         (BoardChoice::Emulated(emulated.cpu_port()), Some(emulated))
-    } else if let (BoardName::Socket(_), Some(option)) = (name, &given) {
-        let error = format!("{option} builds an emulated board, but this one is already built");
-        return Err(Failure::input(error).next(format!("give {option} to its `pgs serve`")));
-    } else if let BoardName::Socket(socket) = name {
-        (BoardChoice::Served { socket: socket.clone() }, None)
-    } else if let Some(option) = given {
-        let error = format!("{option} builds an emulated board, but this one is real");
-        return Err(
-            Failure::input(error).next(format!("leave out {option}, or add --board emulated"))
-        );
-    } else if kind == BoardKind::DevMem {
-        (BoardChoice::DevMem(DevMemWindows::default()), None)
+    } else if matches!(board, BoardChoice::Automatic) {
+        (BoardChoice::Uio { node: UIO_NODE.to_owned() }, None)
     } else {
-        let node = match name {
-            BoardName::Uio(node) => node.as_str(),
-            _ => UIO_NODE,
-        };
-        (BoardChoice::Uio { node: node.to_owned() }, None)
+        (board.clone(), None)
     };
     let pack_threads = Some(config.threads);
     let memory = match kind {
@@ -195,26 +176,16 @@ pub fn not_built(error: ConfigError) -> Failure {
     }
 }
 
-/// Opens a board.
+/// Opens a board; an emulated one is built as `config` says.
 ///
 /// # Errors
 ///
 /// Fails where there is no such board, or it cannot be opened.
-pub fn open(common: &CommonArgs, build: &Build) -> Result<OpenBoard> {
-    open_as(common, build, build.config())
-}
-
-/// As [`open`], with an emulated board of this configuration: the build, and what a scene needs
-/// beside it.
-///
-/// # Errors
-///
-/// Fails where there is no such board, or it cannot be opened.
-pub fn open_as(common: &CommonArgs, build: &Build, config: BoardConfig) -> Result<OpenBoard> {
-    let ChosenBoard { options, observer, reason, .. } = find(common, config, board_option(build))?;
+pub fn open(common: &CommonArgs, config: BoardConfig) -> Result<OpenBoard> {
+    let ChosenBoard { options, observer, reason, .. } = find(common, config)?;
     let accelerator = Accelerator::open(options)
         .map_err(|error| dead(observer.as_ref()).unwrap_or_else(|| unusable(error)))?;
-    let stands_in = common.board == BoardName::Auto && observer.is_some();
+    let stands_in = matches!(common.board, BoardChoice::Automatic) && observer.is_some();
     Ok(OpenBoard { accelerator, observer, injected: None, reason, stands_in })
 }
 
@@ -264,8 +235,8 @@ impl OpenBoard {
         if diverged && self.observer.is_some() {
             // The emulated board does not miscalculate: the input numbers are too large.
             return Failure::input(error).next(
-                "start from smaller velocities (run: a lower --drop, or --hazards interlocked), or \
-                 take a shorter time step (solve: params.npy)",
+                "start from smaller velocities (run: a lower --drop), take a board that \
+                 waits on hazards, or a shorter time step (solve: params.npy)",
             );
         }
         let late = matches!(error.fault(), Some(Fault::Deadline { .. }));
@@ -343,10 +314,6 @@ impl OpenBoard {
         kind_text(self.accelerator.board().kind)
     }
 
-    fn profile(&self) -> &'static str {
-        self.accelerator.capabilities().variant.profile.name
-    }
-
     /// The profile with its formats and inertia, as the bitstream reports them.
     fn design(&self) -> String {
         let Variant { profile, numbers, inertia } = self.accelerator.capabilities().variant;
@@ -369,7 +336,7 @@ impl OpenBoard {
             can.mm2s_channels,
             can.s2mm_channels,
             can.initiation_interval,
-            hazards_text(can.interlocked),
+            if can.interlocked { "interlocked" } else { "unchecked" },
         );
         let bitstream = match can.queue {
             0 => bitstream,
@@ -394,7 +361,7 @@ impl OpenBoard {
         json!({
             "kind": self.kind(),
             "reason": self.reason,
-            "profile": self.profile(),
+            "profile": can.variant.profile.name,
             "design": self.design(),
             "interface_version": [can.version.0, can.version.1],
             "clock_khz": can.clock_khz,
@@ -413,12 +380,7 @@ impl OpenBoard {
             "bytes_per_collision": can.bytes_per_collision,
             "length_width": can.length_width,
             "address_width": can.address_width,
-            "emulation": self.config().map(|config| json!({
-                "build": described(&config),
-                "hazards": hazards_text(config.hazards == Hazards::Interlocked),
-                "window_slots": config.window_slots,
-                "bandwidth_bytes_per_second": bandwidth_number(config.bandwidth),
-            })),
+            "emulation": self.config().map(|config| json!({ "build": described(&config) })),
         })
     }
 
@@ -426,8 +388,4 @@ impl OpenBoard {
     pub fn config(&self) -> Option<BoardConfig> {
         self.observer.as_ref().map(EmulatedBoard::config)
     }
-}
-
-fn hazards_text(interlocked: bool) -> &'static str {
-    if interlocked { "interlocked" } else { "unchecked" }
 }

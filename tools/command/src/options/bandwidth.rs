@@ -13,14 +13,6 @@ pub fn bandwidth_text(bandwidth: Bandwidth) -> String {
     }
 }
 
-/// A bandwidth for programs: bytes per second, `None` if it is unlimited.
-pub fn bandwidth_number(bandwidth: Bandwidth) -> Option<u64> {
-    match bandwidth {
-        Bandwidth::Unlimited => None,
-        Bandwidth::BytesPerSecond(rate) => Some(rate),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

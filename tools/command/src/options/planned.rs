@@ -13,8 +13,9 @@ use zynq_pgs::StepParameters;
 pub struct PlannedArgs {
     /// Make the board fail; `pgs faults --list` prints plans
     ///
-    /// `KIND[=VALUE][@PLACE][,phase=,beat=,bd=,access=,n=,step=,times=]`, several faults separated
-    /// by `;`, or `seed:N` for random ones. `pgs faults --list` prints thousands of plans.
+    /// `KIND[=VALUE][@PLACE]`, behind it any of `,phase=` `,beat=` `,bd=` `,access=` `,n=` `,step=`
+    /// `,times=`; several faults separated by `;`, or `seed:N` for random ones. `pgs faults --list`
+    /// prints thousands of plans.
     #[arg(long, value_name = "PLAN")]
     fault: Option<Planned>,
 }
@@ -69,7 +70,7 @@ impl Injected {
     /// The plan and the number of faults that have happened, for people.
     pub fn text(&self) -> String {
         let planned: u64 = self.plan.faults.iter().map(|fault| u64::from(fault.times)).sum();
-        format!("faults     {} of {planned} happened: {}", self.board.faults(), self.plan)
+        format!("{} of {planned} happened: {}", self.board.faults(), self.plan)
     }
 
     /// The same for programs.

@@ -26,17 +26,17 @@ pub const DROP: f32 = 1.0;
 /// The scene and its size.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// The falling bodies
+    /// The falling bodies: cubes or shapes
     ///
     /// The thesis' cubes, or a pile of shapes (cubes, spheres, boxes, capsules, cylinders, convex
     /// hulls of several masses), which need a board with world inertia: `pgs run` and `pgs thesis
     /// formats` build such an emulated board themselves.
-    #[arg(long, value_enum, default_value_t = SceneName::Cubes)]
+    #[arg(long, value_enum, default_value_t = SceneName::Cubes, hide_possible_values = true)]
     scene: SceneName,
-    /// Bodies along each axis; y is up [default: 36x30x36 cubes, 10x10x10 shapes]
+    /// Bodies along each axis [default: 36x30x36 cubes, 10x10x10 shapes]
     #[arg(long, value_name = "NXxNYxNZ")]
     grid: Option<Grid>,
-    /// Height of the lowest bodies above the ground at the start, m.
+    /// Height of the lowest bodies at the start, m.
     #[arg(long, value_name = "H", default_value_t = DROP, value_parser = drop_height)]
     drop: f32,
     /// Seed of the shapes' kinds and orientations [default: 1]

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::width::{stdout_width, wrapped};
+use super::width::{of_terminal, stdout_width, wrapped};
 
 /// Columns of a label.
 const LABEL: usize = 11;
@@ -13,26 +13,41 @@ const LABEL: usize = 11;
 ///
 /// Fails where the output takes no more.
 pub fn fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
-    labelled(out, label, LABEL, text, stdout_width())
+    labelled(out, &format!("{label:<LABEL$}"), LABEL, text, stdout_width())
 }
 
-/// Writes a text behind a label of `indent` columns, in lines of at most `columns`. Lines end
-/// between words; a word longer than a line stays whole.
+/// The same; a file or a pipe gets it in one line.
 ///
 /// # Errors
 ///
 /// Fails where the output takes no more.
-pub fn labelled(
+pub fn whole_fact(out: &mut dyn Write, label: &str, text: &str) -> io::Result<()> {
+    whole(out, &format!("{label:<LABEL$}"), LABEL, text)
+}
+
+/// Writes a text behind a label of `indent` columns. A terminal gets lines of its width, a file or a
+/// pipe gets one line, which programs can search.
+///
+/// # Errors
+///
+/// Fails where the output takes no more.
+pub fn whole(out: &mut dyn Write, label: &str, indent: usize, text: &str) -> io::Result<()> {
+    let columns = of_terminal(io::stdout()).unwrap_or(usize::MAX);
+    labelled(out, label, indent, text, columns)
+}
+
+/// Lines end between words; a word longer than a line stays whole.
+fn labelled(
     out: &mut dyn Write,
     label: &str,
     indent: usize,
     text: &str,
     columns: usize,
 ) -> io::Result<()> {
-    let mut label = label;
+    let mut label = label.to_owned();
     for line in wrapped(text, columns.saturating_sub(indent)) {
-        writeln!(out, "{}", format!("{label:<indent$}{line}").trim_end())?;
-        label = "";
+        writeln!(out, "{}", format!("{label}{line}").trim_end())?;
+        label = " ".repeat(indent);
     }
     Ok(())
 }
@@ -44,7 +59,7 @@ mod tests {
 
     fn written(label: &str, text: &str) -> String {
         let mut out = Vec::new();
-        labelled(&mut out, label, LABEL, text, MOST).expect("written");
+        labelled(&mut out, &format!("{label:<LABEL$}"), LABEL, text, MOST).expect("written");
         String::from_utf8(out).expect("text")
     }
 

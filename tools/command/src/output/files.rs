@@ -85,7 +85,7 @@ pub struct Files {
 impl Files {
     /// No file but the simulator, which is read.
     pub fn of(common: &CommonArgs) -> Self {
-        let simulator = common.accelerator.simulator();
+        let simulator = common.accelerator.simulator.as_ref();
         let inputs = simulator.map(|(path, _)| Named::option("accelerator", path));
         Self { outputs: Vec::new(), inputs: inputs.into_iter().collect() }
     }

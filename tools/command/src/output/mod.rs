@@ -9,12 +9,20 @@ pub mod width;
 
 use std::time::Duration;
 
+use clap::builder::styling::{AnsiColor, Style};
 use serde_json::{Value, json};
 use zynq_pgs::StepReport;
 use zynq_pgs::report::Limit;
 
 /// Version of the JSON documents' layout; it grows when a key changes its meaning or goes.
 pub const SCHEMA: u32 = 1;
+
+/// The colour of a check that passed. A stream without colours leaves it out.
+pub const GOOD: Style = AnsiColor::Green.on_default();
+/// The colour of a failure.
+pub const BAD: Style = AnsiColor::Red.on_default().bold();
+/// The colour of what was refused or left out.
+pub const REFUSED: Style = AnsiColor::Yellow.on_default();
 
 /// A time in milliseconds.
 pub fn milliseconds(duration: Duration) -> f64 {

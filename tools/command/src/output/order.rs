@@ -20,29 +20,6 @@ pub fn beside_bullet(report: &StepReport, capabilities: &Capabilities) -> Option
     }
 }
 
-/// The orders of a run's steps, and the number of steps in each: a board without a queue may take
-/// one step as given and the next one reordered.
-#[derive(Debug, Default)]
-pub struct OrdersSent(Vec<(Order, u64)>);
-
-impl OrdersSent {
-    /// Counts a step.
-    pub fn count(&mut self, order: Order) {
-        match self.0.iter_mut().find(|(taken, _)| *taken == order) {
-            Some((_, steps)) => *steps += 1,
-            None => self.0.push((order, 1)),
-        }
-    }
-
-    /// In words, in the order of the first steps; none if all steps had one order.
-    pub fn text(&self) -> Option<String> {
-        let all: u64 = self.0.iter().map(|(_, steps)| steps).sum();
-        let each = self.0.iter().map(|(order, steps)| (name(*order), grouped(*steps)));
-        let texts: Vec<String> = each.map(|(name, steps)| format!("{name} in {steps}")).collect();
-        (texts.len() > 1).then(|| format!("of {} steps {}", grouped(all), texts.join(", ")))
-    }
-}
-
 /// The order of a step, and the reason for it.
 pub fn with_reason(report: &StepReport) -> String {
     let name = name(report.order);

@@ -226,18 +226,32 @@ impl Table {
         (0..lines.unwrap_or(0)).map(line).collect()
     }
 
-    /// The table in aligned columns, and its notes in lines of at most `width`.
-    pub fn to_text(&self, width: usize) -> String {
+    /// The table in aligned columns, and its notes in lines of at most `width`. A table of more than
+    /// `columns` goes on below itself, with its first column again.
+    pub fn to_text(&self, width: usize, columns: usize) -> String {
         let mut out = format!("{}\n", self.title);
         let rows = self.rows.iter().map(|row| row.iter().map(Cell::shown).collect());
         let lines: Vec<Vec<String>> = self.heads().into_iter().chain(rows).collect();
         let widths: Vec<usize> = (0..self.columns.len())
             .map(|k| lines.iter().map(|row| row[k].chars().count()).max().unwrap_or(0))
             .collect();
-        let places = || widths.iter().enumerate().map(|(k, width)| (*width, self.at_right(k)));
-        for row in &lines {
-            let line = format!("  {}", aligned(row, places(), "  "));
-            let _ = writeln!(out, "{}", line.trim_end());
+        let mut parts = vec![Vec::new()];
+        for k in 0..widths.len() {
+            let taken = |part: &Vec<usize>| part.iter().map(|k| widths[*k] + 2).sum::<usize>();
+            let is_full = |part: &Vec<usize>| taken(part) + widths[k] + 2 > columns;
+            if parts.last().is_some_and(|part| part.len() > 1 && is_full(part)) {
+                parts.push(vec![0]);
+            }
+            parts.last_mut().into_iter().for_each(|part| part.push(k));
+        }
+        for (at, part) in parts.iter().enumerate() {
+            out += if at > 0 { "\n" } else { "" };
+            for row in &lines {
+                let cells: Vec<String> = part.iter().map(|k| row[*k].clone()).collect();
+                let places = part.iter().map(|k| (widths[*k], self.at_right(*k)));
+                let line = format!("  {}", aligned(&cells, places, "  "));
+                let _ = writeln!(out, "{}", line.trim_end());
+            }
         }
         for note in &self.notes {
             for (k, line) in wrapped(note, width.saturating_sub(BULLET)).iter().enumerate() {
@@ -354,10 +368,19 @@ mod tests {
     #[test]
     fn numbers_stand_at_the_right_and_words_at_the_left() {
         assert_eq!(
-            table().to_text(80),
+            table().to_text(80, 80),
             "A table\n  name      n    diff.\n          all\n  a|b   1,234  +0.17 %\n  <c>       \
              -      \
              2.0\n  * Said.\n"
+        );
+    }
+
+    #[test]
+    fn a_table_wider_than_the_terminal_goes_on_below_with_its_first_column() {
+        assert_eq!(
+            table().to_text(80, 14),
+            "A table\n  name      n\n          all\n  a|b   1,234\n  <c>       -\n\n  name    diff.\n\n  \
+             a|b   +0.17 %\n  <c>       2.0\n  * Said.\n"
         );
     }
 

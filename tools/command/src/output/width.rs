@@ -21,6 +21,11 @@ pub fn of_terminal(stream: impl AsFd) -> Option<usize> {
     terminal_size_of(stream).map(|(Width(columns), _)| MOST.min(columns.into()))
 }
 
+/// Columns of a table on stdout: all of a terminal, without an end in a file or a pipe.
+pub fn terminal() -> usize {
+    terminal_size_of(io::stdout()).map_or(usize::MAX, |(Width(columns), _)| columns.into())
+}
+
 /// Breaks a text between words into lines of at most `columns`; a longer word stays whole.
 pub fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];

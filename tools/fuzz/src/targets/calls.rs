@@ -145,6 +145,7 @@ impl Bodies {
             linear_velocities: linear.strided(),
             angular_velocities: angular.strided(),
             shapes: shapes.constant(),
+            ..BodyArrays::default()
         };
         Self { columns, shapes, structure: Sized::any(input, arrays) }
     }

@@ -3,7 +3,6 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use pgs_thesis::estimate::thesis::recorded::ZCU102_WATTS;
 use serde_json::{Value, json};
 
 use super::sensors::{Domain, GAIN_ERROR, Sensors, Watts};
@@ -133,17 +132,6 @@ impl Energy {
     }
 }
 
-/// The energy of a step that takes `ms` milliseconds, at the thesis' power, for boards without
-/// sensors.
-pub(crate) fn at_thesis_power(ms: f64) -> (String, Value) {
-    let joules = ZCU102_WATTS * ms / 1e3;
-    let text = format!(
-        "{joules:.3} J a step at {ZCU102_WATTS} W, the power that the thesis takes for the board: \
-         not measured"
-    );
-    (text, json!({ "origin": "recorded", "watts": ZCU102_WATTS, "joules_a_step": joules }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::sensors::tests::monitors;
@@ -177,15 +165,5 @@ mod tests {
         assert_eq!(document["logic"]["rails"], json!(["VCCINT"]));
         assert_eq!(document.get("processor"), None);
         assert!(!energy.text().contains("processing system"));
-    }
-
-    #[test]
-    fn without_sensors_the_power_is_called_the_thesis() {
-        let (text, document) = at_thesis_power(7.49);
-        assert!(
-            text.starts_with("0.112 J a step at 15 W") && text.ends_with("not measured"),
-            "{text}"
-        );
-        assert_eq!(document["origin"], "recorded");
     }
 }

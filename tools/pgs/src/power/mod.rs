@@ -5,6 +5,5 @@ mod energy;
 mod meter;
 mod sensors;
 
-pub(crate) use energy::at_thesis_power;
 pub(crate) use meter::PowerMeter;
 pub(crate) use sensors::{HWMON, Sensors};

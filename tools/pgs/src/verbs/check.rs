@@ -6,24 +6,25 @@ use bitstream_model::interface::fence::Fence;
 use bitstream_model::{
     BoardConfig, Coherency, Direction, InterruptWiring, Master, Quirks, Resettable,
 };
+use clap::builder::styling::Style;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use zynq_pgs::board::BoardKind;
 use zynq_pgs::check::{CheckLine, Outcome};
+use zynq_pgs::emulation::Build;
 use zynq_pgs::{CheckReport, check};
 
 use pgs_command::board::{self, ChosenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
-use pgs_command::failure::{Result, Verdict};
-use pgs_command::options::build::{BuildArgs, board_option};
-use pgs_command::output::SCHEMA;
-use pgs_command::output::facts::labelled;
-use pgs_command::output::width::of_terminal;
+use pgs_command::failure::{Failure, Result, Verdict};
+use pgs_command::output::facts::whole;
+use pgs_command::output::{BAD, GOOD, REFUSED, SCHEMA};
 
 const EXAMPLES: &str = "\
 Examples:
   pgs check --board emulated --json
   pgs check --board emulated --quirk stale     see what a failure looks like
-  pgs check --board emulated --fence 0x50000000+64M   DMA cores that reach this memory alone
+  pgs check --board emulated:float,fence=0x50000000+64M   DMA cores that reach this memory alone
 
 Examples on a board:
   pgs check
@@ -32,16 +33,13 @@ Examples on a board:
 Resets the board: nothing else may use it meanwhile. Exit code 0 if no line fails, 1 if one does,
 3 if there is no board. The emulated board is tested only if --board or PGS_BOARD asks for it.";
 
-/// Test a board: identity, reset, DMA, data in both directions, coherency, interrupt, queue, fence;
-/// a failure names the next step.
+/// Test a board line by line; a failure names the next step
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CheckArgs {
     /// Build the emulated board with a defect, to see how the test reports it
     #[arg(long, value_enum, value_name = "QUIRK", help_heading = "Emulated board")]
     quirk: Option<QuirkName>,
-    #[command(flatten)]
-    build: BuildArgs,
     #[command(flatten)]
     pub(crate) board: BoardOptions,
     #[command(flatten)]
@@ -103,19 +101,14 @@ impl QuirkName {
 }
 
 impl CheckArgs {
-    fn config(&self) -> BoardConfig {
+    fn config(&self, build: &Build) -> BoardConfig {
         let quirks = self.quirk.map(QuirkName::quirks).unwrap_or_default();
-        let config = self.build.build().config();
+        let config = build.config();
         // These two are about a fence.
         let needs = matches!(self.quirk, Some(QuirkName::OpenFence | QuirkName::NoGuard));
         let fence = config.fence.or(needs.then(Fence::default));
         let queue = if quirks.queue.is_some() { Some(0) } else { config.queue };
         BoardConfig { quirks, fence, queue, ..config }
-    }
-
-    /// The first given option that only an emulated board has.
-    fn board_option(&self) -> Option<String> {
-        self.quirk.map(|_| "--quirk".to_owned()).or_else(|| board_option(&self.build.build()))
     }
 }
 
@@ -123,7 +116,11 @@ impl CheckArgs {
 pub(crate) fn run(args: &CheckArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     board::require(common)?;
     let ChosenBoard { kind, options, reason, .. } =
-        board::find(common, args.config(), args.board_option())?;
+        board::find(common, args.config(&common.build()))?;
+    if args.quirk.is_some() && kind != BoardKind::Emulated {
+        let error = "--quirk builds an emulated board, but this one is there already";
+        return Err(Failure::input(error).next("leave out --quirk, or add --board emulated"));
+    }
     let report = check(options).map_err(board::unusable)?;
     let kind = board::kind_text(kind);
     if common.json {
@@ -157,25 +154,28 @@ fn line_json(line: &CheckLine) -> Value {
 
 fn print(report: &CheckReport, out: &mut dyn Write) -> std::io::Result<()> {
     let (mut failed, mut skipped) = (0, 0);
-    // A file or a pipe gets whole lines, which programs can search.
-    let columns = of_terminal(std::io::stdout()).unwrap_or(usize::MAX);
-    let mut line = |begin: &str, name: &str, text: &str| {
-        labelled(out, &format!("{begin:<6}{name}"), 25, text, columns)
+    let mut line = |style: Style, begin: &str, name: &str, text: &str| {
+        whole(
+            out,
+            &format!("{style}{begin}{style:#}{:1$}{name:<19}", "", 6 - begin.len()),
+            25,
+            text,
+        )
     };
     for CheckLine { name, outcome, .. } in &report.lines {
         match outcome {
-            Outcome::Ok { detail } => line("ok", name, detail)?,
+            Outcome::Ok { detail } => line(GOOD, "ok", name, detail)?,
             Outcome::Failed { found, expected, next } => {
                 failed += 1;
-                line("FAIL", name, &format!("found {found}"))?;
-                line("", "", &format!("expected {expected}"))?;
-                line("", "", &format!("next: {next}"))?;
+                line(BAD, "FAIL", name, &format!("found {found}"))?;
+                line(BAD, "", "", &format!("expected {expected}"))?;
+                line(BAD, "", "", &format!("next: {next}"))?;
             }
             Outcome::Skipped { reason } => {
                 skipped += 1;
-                line("skip", name, reason)?;
+                line(REFUSED, "skip", name, reason)?;
             }
-            _ => line("?", name, "")?,
+            _ => line(REFUSED, "?", name, "")?,
         }
     }
     let passed = report.lines.len() - failed - skipped;

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use pgs_command::common::{CommonArgs, ManagerOptions};
 use pgs_command::failure::{Cause, Failure, INTERRUPTED, Result, Verdict};
 use pgs_command::interrupt;
+use pgs_command::output::facts::whole_fact;
 use pgs_command::output::{SCHEMA, milliseconds};
 
 const EXAMPLES: &str = "\
@@ -28,7 +29,7 @@ a device file of the logic, a u-dma-buf or /dev/mem open or locked. Without --re
 refuses while another overlay is applied or a driver is bound to the logic. Remove the overlay by
 rmdir /sys/kernel/config/device-tree/overlays/pgs; see device-tree/README.md.";
 
-/// Load a bitstream into the board through the kernel's FPGA manager.
+/// Load a bitstream through the kernel's FPGA manager
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LoadArgs {
@@ -86,7 +87,7 @@ pub(crate) fn run(args: &LoadArgs, common: &CommonArgs, out: &mut dyn Write) -> 
             writeln!(out, "{:#}", document(args, &judged))?;
         } else {
             write_judged(args, &judged, out)?;
-            writeln!(out, "checked    nothing was loaded")?;
+            whole_fact(out, "checked", "nothing was loaded")?;
         }
         return Ok(Verdict::Done);
     }
@@ -124,23 +125,26 @@ pub(crate) fn run(args: &LoadArgs, common: &CommonArgs, out: &mut dyn Write) -> 
     }
 
     write_judged(args, &loaded.judged, out)?;
-    writeln!(
-        out,
-        "manager    {} ({}): {} -> {}, {:.1} ms",
-        loaded.manager,
-        loaded.manager_name,
-        loaded.state_before,
-        loaded.state,
-        milliseconds(loaded.time),
+    let mut line = |label: &str, text: String| whole_fact(out, label, &text);
+    line(
+        "manager",
+        format!(
+            "{} ({}): {} -> {}, {:.1} ms",
+            loaded.manager,
+            loaded.manager_name,
+            loaded.state_before,
+            loaded.state,
+            milliseconds(loaded.time),
+        ),
     )?;
     if let Some(overlay) = loaded.overlay {
-        writeln!(out, "overlay    {overlay:?} applied")?;
+        line("overlay", format!("{overlay:?} applied"))?;
     }
     for node in &loaded.nodes {
-        writeln!(out, "uio node   {} {:?}", node.device, node.name)?;
+        line("uio node", format!("{} {:?}", node.device, node.name))?;
     }
     if loaded.nodes.is_empty() {
-        writeln!(out, "uio node   none: apply an overlay, see device-tree/README.md")?;
+        line("uio node", "none: apply an overlay, see device-tree/README.md".to_owned())?;
     }
     Ok(Verdict::Done)
 }
@@ -165,11 +169,9 @@ fn document(args: &LoadArgs, judged: &Judged) -> Value {
 /// The same facts, for people.
 fn write_judged(args: &LoadArgs, judged: &Judged, out: &mut dyn Write) -> io::Result<()> {
     let (file, bytes) = (args.file.display(), judged.bytes());
-    writeln!(out, "bitstream  {file}, {bytes} bytes")?;
-    match judged.chip {
-        Some(chip) => writeln!(out, "chip       {chip}")?,
-        None => writeln!(out, "chip       not known")?,
-    }
+    whole_fact(out, "bitstream", &format!("{file}, {bytes} bytes"))?;
+    let chip = judged.chip.map_or_else(|| "not known".to_owned(), |chip| chip.to_string());
+    whole_fact(out, "chip", &chip)?;
     let wanted = match judged.wanted_mhz {
         Some(mhz) => format!("the bitstream asks for {mhz} MHz"),
         None => "the bitstream does not say which rate it asks for (no USR_ACCESS)".to_owned(),
@@ -179,5 +181,5 @@ fn write_judged(args: &LoadArgs, judged: &Judged, out: &mut dyn Write) -> io::Re
         Some(None) => ", the overlay sets none".to_owned(),
         None => String::new(),
     };
-    writeln!(out, "pl clock   {wanted}{set}")
+    whole_fact(out, "pl clock", &format!("{wanted}{set}"))
 }

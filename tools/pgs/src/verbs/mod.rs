@@ -41,9 +41,12 @@ impl Verb {
     pub(crate) fn given(&self) -> Given {
         let none = Given::default();
         match self.clone() {
-            Self::Run(RunArgs { board, accelerator, .. })
-            | Self::Solve(SolveArgs { board, accelerator, .. })
-            | Self::Check(CheckArgs { board, accelerator, .. }) => {
+            Self::Run(RunArgs { board, threads, accelerator, .. })
+            | Self::Solve(SolveArgs { board, threads, accelerator, .. }) => {
+                let (board, accelerator) = (Some(board), Some(accelerator));
+                Given { board, accelerator, threads: threads.threads, ..none }
+            }
+            Self::Check(CheckArgs { board, accelerator, .. }) => {
                 Given { board: Some(board), accelerator: Some(accelerator), ..none }
             }
             Self::List(ListArgs { board, .. }) => Given { board: Some(board), ..none },

@@ -15,26 +15,27 @@ use pgs_command::common::{AcceleratorOptions, CommonArgs};
 use pgs_command::failure::{Cause, Failure, Result, Verdict};
 use pgs_command::interrupt;
 use pgs_command::numbers::grouped;
-use pgs_command::options::build::{BuildArgs, described};
+use pgs_command::options::build::{BuiltArgs, described};
 use pgs_command::options::planned::PlannedArgs;
-use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::whole_fact;
 use pgs_command::output::files::{Files, Named};
+use pgs_command::output::{REFUSED, SCHEMA};
 
 const EXAMPLES: &str = "\
 Examples:
   pgs serve --socket /tmp/board                   in one terminal
   pgs --board socket:/tmp/board                   in another
-  pgs serve --socket /tmp/board --memory-mib 256 --profile half
+  pgs serve --socket /tmp/board --memory-mib 256 --board emulated:half
   pgs serve --socket /tmp/board --fault 'stall@dma1.mm2s,step=3'
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs serve --socket /tmp/board --accelerator rtl:rtl-sim/pgs-rtl
 
 One driver at a time has the board, with new memory of its own; a connection that says nothing for
 5 s is closed. A killed driver leaves the engines running, and the next driver resets them. Ctrl-C
 ends the server and removes the socket.";
 
-/// Serve an emulated board to drivers in other processes, at a Unix socket.
+/// Serve an emulated board to other processes, at a Unix socket
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ServeArgs {
@@ -50,7 +51,7 @@ pub(crate) struct ServeArgs {
     )]
     memory_mib: u64,
     #[command(flatten)]
-    build: BuildArgs,
+    built: BuiltArgs,
     #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
@@ -70,13 +71,13 @@ struct Tally {
 pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
     Files::of(common).write([Named::option("socket", &args.socket)]).check()?;
     // A driver's mistake is reported, and the board goes on to serve the next driver.
-    let mut config = BoardConfig { strict: false, ..args.build.build().config() };
-    let planned = args.planned.plan(&config, &StepParameters::default());
+    let mut config = BoardConfig { strict: false, ..args.built.board.unwrap_or_default().config() };
+    let planned = args.planned.plan(&config, &StepParameters::thesis());
     let accelerator = external_accelerator(&mut config, &common.accelerator)?;
     let bytes = args.memory_mib << 20;
     if let Some(fence) = config.fence.filter(|fence| !fence.contains(MEMORY_BASE, bytes)) {
         let error = format!("{bytes} bytes of memory at {MEMORY_BASE:#x} reach out of {fence}");
-        return Err(Failure::input(error).next("give a smaller --memory-mib, or another --fence"));
+        return Err(Failure::input(error).next("give a smaller --memory-mib, or another fence"));
     }
     let memory = MEMORY_BASE..MEMORY_BASE + bytes;
     let mut server =
@@ -100,16 +101,17 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
     interrupt::take_over(move || at_signal.stop());
 
     if !common.json {
-        writeln!(out, "board      {}", described(&config))?;
-        if let Some((simulator, _)) = common.accelerator.simulator() {
-            writeln!(out, "simulator  {}", simulator.display())?;
+        let mut line = |label: &str, text: String| whole_fact(out, label, &text);
+        line("board", described(&config))?;
+        if let Some((simulator, _)) = &common.accelerator.simulator {
+            line("simulator", simulator.display().to_string())?;
         }
         if let Some(plan) = &planned {
-            writeln!(out, "faults     {plan}")?;
+            line("faults", plan.to_string())?;
         }
         let bytes = grouped(bytes);
-        writeln!(out, "memory     {bytes} bytes at {MEMORY_BASE:#x}, new for each driver")?;
-        writeln!(out, "serving    pgs --board socket:{}", args.socket.display())?;
+        line("memory", format!("{bytes} bytes at {MEMORY_BASE:#x}, new for each driver"))?;
+        line("serving", format!("pgs --board socket:{}", args.socket.display()))?;
         out.flush()?;
     }
     let mut tally = Tally::default();
@@ -154,14 +156,13 @@ pub(crate) fn run(args: &ServeArgs, common: &CommonArgs, out: &mut dyn Write) ->
         });
         writeln!(out, "{document:#}")?;
     } else {
-        writeln!(
-            out,
-            "served     {} drivers, {} left engines running; {} requests, {} violations",
-            grouped(drivers),
-            grouped(left_running),
-            grouped(requests),
-            grouped(violations),
-        )?;
+        let [drivers, left, requests, violations] =
+            [drivers, left_running, requests, violations].map(grouped);
+        let text = format!(
+            "{drivers} drivers, {left} left engines running; {requests} requests, {violations} \
+             violations"
+        );
+        whole_fact(out, "served", &text)?;
     }
     match dead {
         Some(reason) => {
@@ -179,13 +180,14 @@ fn at(number: u64) -> usize {
 /// Reports a driver that has left.
 fn line(out: &mut dyn Write, number: u64, visit: &Visit) -> io::Result<()> {
     let Visit { requests, ended, left_running, .. } = visit;
-    write!(out, "driver {number:<3} {} requests, ", grouped(*requests))?;
-    match ended {
-        Ended::Left => write!(out, "left")?,
-        Ended::Refused(error) => write!(out, "refused: {error}")?,
-        Ended::Broken(error) => write!(out, "broken off: {error}")?,
-        _ => write!(out, "gone")?,
-    }
-    writeln!(out, ", {}", if *left_running { "engines running" } else { "engines at rest" })?;
+    let ended = match ended {
+        Ended::Left => "left".to_owned(),
+        Ended::Refused(error) => format!("{REFUSED}refused{REFUSED:#}: {error}"),
+        Ended::Broken(error) => format!("broken off: {error}"),
+        _ => "gone".to_owned(),
+    };
+    let engines = if *left_running { "engines running" } else { "engines at rest" };
+    let text = format!("{} requests, {ended}, {engines}", grouped(*requests));
+    whole_fact(out, &format!("driver {number:<3}"), &text)?;
     out.flush()
 }

@@ -8,7 +8,7 @@ use scene::kinetic_energy;
 use serde_json::{Value, json};
 use zynq_pgs::{Body, Capabilities, StepParameters, StepReport};
 
-use crate::a53::HostTimes;
+use crate::a53::{Paper, ratio_text};
 use crate::bug_report::FaultArgs;
 use crate::difference::{self, Difference};
 use crate::traced::TracedArgs;
@@ -17,12 +17,12 @@ use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::numbers::{Bound, grouped};
-use pgs_command::options::build::BuildArgs;
+use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
 use pgs_command::output::SCHEMA;
-use pgs_command::output::facts::fact;
+use pgs_command::output::facts::{fact, whole_fact};
 use pgs_command::output::files::{Files, Named, unwritten};
 use pgs_command::output::order;
 use pgs_command::output::{limit_text, milliseconds};
@@ -38,9 +38,8 @@ const EXAMPLES: &str = "\
 Examples:
   pgs solve tests/golden/one_cube --compare
   pgs solve tests/golden/pile5_step60 --out result --digest
-  pgs solve tests/golden/pile5_step60 --hazards unchecked --verify
+  pgs solve tests/golden/pile5_step60 --board emulated:float,unchecked --verify
   pgs solve tests/golden/one_cube --vcd step.vcd --trace step.json --timeline step.svg
-  pgs solve tests/golden/pile5_step60 --compare --length-width 14 --address-width 32
   pgs solve tests/golden/one_cube --compare --contact-iterations 2 --friction-iterations 0 \\
       --no-integrate
 
@@ -107,13 +106,13 @@ pub(crate) struct SolveArgs {
     #[command(flatten)]
     faults: FaultArgs,
     #[command(flatten)]
-    build: BuildArgs,
-    #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
     traced: TracedArgs,
     #[command(flatten)]
     pub(crate) board: BoardOptions,
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
     #[command(flatten)]
     pub(crate) accelerator: AcceleratorOptions,
 }
@@ -168,7 +167,7 @@ pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) ->
         true => expected(&folder, &parameters)?,
         false => Vec::new(),
     };
-    let mut opened = board::open(common, &args.build.build())?;
+    let mut opened = board::open(common, common.build().config())?;
     folder.check_shapes(opened.accelerator.capabilities().shapes_max()).map_err(Failure::input)?;
     let parameters = args.ordered(parameters, opened.accelerator.capabilities());
     let tracing = args.traced.tracing(&opened)?;
@@ -210,7 +209,7 @@ pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) ->
     let solved = StepResult {
         parameters,
         beside_bullet,
-        a53: HostTimes::of(&opened.accelerator, &report, [parameters.warm_start, false]),
+        a53: Paper::of(&opened.accelerator, &report, [parameters.warm_start, false]),
         report,
         energy: [energy_before, kinetic_energy(&bodies, &folder.shapes)],
         digest: format!("{:016x}", digest::of_bodies(&bodies)),
@@ -230,7 +229,7 @@ pub(crate) fn run(args: &SolveArgs, common: &CommonArgs, out: &mut dyn Write) ->
     } else {
         opened.print(out)?;
         if let Some(faults) = opened.faults_text() {
-            writeln!(out, "{faults}")?;
+            fact(out, "faults", &faults)?;
         }
         solved.print(out)?;
         args.traced.print(inside, out)?;
@@ -321,8 +320,8 @@ struct StepResult {
     /// How the order relates to Bullet's, if the results are compared.
     beside_bullet: Option<&'static str>,
     report: StepReport,
-    /// The host's time on the processor of a ZCU102, if it is counted.
-    a53: Option<HostTimes>,
+    /// The step on the processor of a ZCU102, if it is counted.
+    a53: Option<Paper>,
     /// Before and after the step, J.
     energy: [f64; 2],
     digest: String,
@@ -337,71 +336,73 @@ impl StepResult {
     }
 
     fn print(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        let report = &self.report;
-        let saturated = report.saturated;
-        writeln!(
-            out,
-            "step       {} bodies, {} collisions, {} contact and {} friction iterations, {}",
-            grouped(report.bodies),
-            grouped(report.collisions),
-            self.parameters.contact_iterations,
-            self.parameters.friction_iterations,
-            if self.parameters.integrate { "integrated" } else { "not integrated" },
+        let Self { report, parameters, energy: [before, after], .. } = self;
+        let (saturated, modelled) = (report.saturated, milliseconds(report.modelled_time()));
+        let mut line = |label: &str, text: String| whole_fact(out, label, &text);
+        line(
+            "step",
+            format!(
+                "{} bodies, {} collisions, {} contact and {} friction iterations, {}",
+                grouped(report.bodies),
+                grouped(report.collisions),
+                parameters.contact_iterations,
+                parameters.friction_iterations,
+                if parameters.integrate { "integrated" } else { "not integrated" },
+            ),
         )?;
         let mut order = order::text(report);
         if let Some(text) = self.beside_bullet.map(str::to_owned).or(order::reason(report)) {
             order += &format!(" ({text})");
         }
-        fact(out, "order", &order)?;
-        writeln!(
-            out,
-            "cycles     {} = {} by formula + {} stalls + {} waits; {:.3} ms modelled, limit: {}",
-            grouped(report.cycles.total),
-            Bound::AtLeast.words(saturated.work, report.cycles.work),
-            Bound::AtMost.words(saturated.stalls(), report.cycles.stalls),
-            Bound::AtLeast.words(saturated.waits, report.cycles.waits),
-            milliseconds(report.modelled_time()),
-            limit_text(report.limit()),
+        line("order", order)?;
+        line(
+            "cycles",
+            format!(
+                "{} = {} by formula + {} stalls + {} waits; {modelled:.3} ms modelled, limit: {}",
+                grouped(report.cycles.total),
+                Bound::AtLeast.words(saturated.work, report.cycles.work),
+                Bound::AtMost.words(saturated.stalls(), report.cycles.stalls),
+                Bound::AtLeast.words(saturated.waits, report.cycles.waits),
+                limit_text(report.limit()),
+            ),
         )?;
-        if let Some(a53) = &self.a53 {
-            fact(out, "host on an", &a53.text(1, milliseconds(report.modelled_time())))?;
-        }
-        writeln!(
-            out,
-            "transfers  {} bytes to the board and {} back, in {} descriptors",
-            grouped(report.bytes_to_device),
-            grouped(report.bytes_from_device),
-            grouped(report.descriptors),
+        line("ratio", ratio_text(self.a53, 1, modelled))?;
+        line(
+            "transfers",
+            format!(
+                "{} bytes to the board and {} back, in {} descriptors",
+                grouped(report.bytes_to_device),
+                grouped(report.bytes_from_device),
+                grouped(report.descriptors),
+            ),
         )?;
-        writeln!(
-            out,
-            "hazards    {} ({}{:.1} % of the collisions of a pass)",
-            Bound::AtLeast.words(saturated.hazards, report.hazards),
-            if saturated.hazards { "at least " } else { "" },
-            self.hazard_share() * 100.0,
+        line(
+            "hazards",
+            format!(
+                "{} ({}{:.1} % of the collisions of a pass)",
+                Bound::AtLeast.words(saturated.hazards, report.hazards),
+                if saturated.hazards { "at least " } else { "" },
+                self.hazard_share() * 100.0,
+            ),
         )?;
         match report.impulse_sum {
-            Some(sum) => writeln!(out, "impulses   {sum:.3} N s")?,
+            Some(sum) => line("impulses", format!("{sum:.3} N s"))?,
             None if saturated.impulse_sum => {
                 #[allow(clippy::cast_possible_truncation, reason = "a whole number, 2^44")]
                 let most = StepReport::IMPULSE_SUM_MAX as u64;
-                writeln!(out, "impulses   {} N s", Bound::AtLeast.words(true, most))?;
+                line("impulses", format!("{} N s", Bound::AtLeast.words(true, most)))?;
             }
             None => {}
         }
         if report.retries > 0 {
-            writeln!(out, "retries    {}", report.retries)?;
+            line("retries", report.retries.to_string())?;
         }
-        let [before, after] = self.energy;
-        writeln!(out, "energy     {before:.3} J before, {after:.3} J after (kinetic)")?;
-        writeln!(out, "digest     {} {}", digest::ALGORITHM, self.digest)?;
-        for difference in &self.differences {
-            let Difference { array, values, differing, largest, first } = difference;
-            write!(out, "compare    {array}: {differing} of {values} values differ in bits")?;
-            match first {
-                None => writeln!(out)?,
-                Some(first) => writeln!(out, ", by {largest:e} at most, first at {first}")?,
-            }
+        line("energy", format!("{before:.3} J before, {after:.3} J after (kinetic)"))?;
+        line("digest", format!("{} {}", digest::ALGORITHM, self.digest))?;
+        for Difference { array, values, differing, largest, first } in &self.differences {
+            let at = first.as_ref().map(|at| format!(", by {largest:e} at most, first at {at}"));
+            let at = at.unwrap_or_default();
+            line("compare", format!("{array}: {differing} of {values} values differ in bits{at}"))?;
         }
         Ok(())
     }
@@ -422,7 +423,7 @@ impl StepResult {
             })
             .collect();
         let mut step = pgs_command::output::report_json(&self.report);
-        step["host_on_a53_ms"] = self.a53.map(HostTimes::to_json).into();
+        step["host_on_a53_ms"] = self.a53.map(Paper::to_json).into();
         json!({
             "schema": SCHEMA,
             "verb": "solve",

@@ -11,7 +11,7 @@ use crate::common::{Ran, Tied, golden, pgs, run};
 fn solve(accelerator: &str, more: &[&str]) -> (Option<i32>, String) {
     let folder = golden("one_cube");
     let folder = folder.to_str().expect("a path in UTF-8");
-    let arguments = ["solve", folder, "--board", "emulated", "--accelerator", accelerator];
+    let arguments = ["solve", folder, "--accelerator", accelerator];
     let ran = run(arguments.iter().chain(more));
     (ran.code, ran.stderr)
 }
@@ -55,7 +55,7 @@ fn a_simulator_of_another_profile_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let words = "1SGP\\001\\000\\000\\000\\000\\000\\000\\000";
     let float = program(folder.path(), &format!("#!/bin/sh\nprintf '{words}'\ncat >/dev/null\n"));
-    let (code, stderr) = solve(&float, &["--profile", "half"]);
+    let (code, stderr) = solve(&float, &["--board", "emulated:half"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("float") && stderr.contains("half"), "{stderr}");
 }
@@ -68,11 +68,12 @@ fn a_simulator_of_another_inertia_is_refused_with_the_next_step() {
     let words = "1SGP\\001\\000\\000\\000\\001\\000\\000\\000";
     let isotropic =
         program(folder.path(), &format!("#!/bin/sh\nprintf '{words}'\ncat >/dev/null\n"));
-    let (code, stderr) = solve(&isotropic, &["--inertia", "world"]);
+    let (code, stderr) = solve(&isotropic, &["--board", "emulated:float,world"]);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.contains("built for isotropic inertia, and the board for world"), "{stderr}");
     assert!(
-        stderr.contains("add --inertia isotropic, or build the simulator with --inertia world"),
+        stderr
+            .contains("add the word isotropic to the board, or build the simulator with --inertia"),
         "{stderr}"
     );
 }

@@ -19,7 +19,7 @@ fn lines_that(document: &Value, outcome: &str) -> Vec<String> {
 
 #[test]
 fn a_good_board_ends_with_0_and_thirteen_lines() {
-    let ran = check(&["--fence", "0x50000000+64M"]);
+    let ran = check(&["--board", "emulated:float,fence=0x50000000+64M"]);
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
     assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("ok    ")).count(), 13);
     assert!(ran.stdout.ends_with("13 ok, 0 failed, 0 skipped\n"), "{}", ran.stdout);
@@ -37,7 +37,7 @@ fn without_a_guard_the_fence_is_not_proven() {
     let ran = check(&["--quirk", "no-guard"]);
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("\nskip  fence              not proven: "), "{}", ran.stdout);
-    let ran = check(&["--fence", "0x50000000+63M"]);
+    let ran = check(&["--board", "emulated:float,fence=0x50000000+63M"]);
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     assert!(ran.stderr.contains("a power of two"), "{}", ran.stderr);
 }
@@ -120,7 +120,7 @@ fn the_emulated_board_does_not_stand_in_for_one_that_is_missing() {
 
 #[test]
 fn narrow_length_registers_that_are_declared_pass() {
-    let ran = check(&["--length-width", "14", "--address-width", "32"]);
+    let ran = check(&["--board", "emulated:float,length-width=14,address-width=32"]);
     assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("14 bits on 8 channels"), "{}", ran.stdout);
 }

@@ -128,7 +128,7 @@ fn a_pile_of_shapes_takes_world_inertia_and_loses_its_energy() {
     let ran = run([&["thesis", "compare", "float", "float,world"], &scene[..]].concat());
     assert_eq!(ran.code, Some(2), "{}", ran.stdout);
     assert!(ran.stderr.contains("board A (float)"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("--inertia world"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the word world"), "{}", ran.stderr);
 
     let document = compare(&[&["float,world", "float,world,threads=1"], &scene[..]].concat());
     assert_same(&document, 150);
@@ -241,9 +241,8 @@ fn wrong_usage_says_what_is_known() {
         (&["thesis", "compare", "float", "half", "--input", "x", "--grid", "2x2x2"], "--grid"),
         (&["thesis", "compare", "float", "half", "--input", "/nonexistent"], "/nonexistent"),
         (&["thesis", "compare", "float", "half", "--seed", "3"], "--scene shapes"),
-        (&["thesis", "formats", "--input", "x", "--profile", "half"], "--profile"),
-        (&["run", "--profile", "quarter"], "naive, float, half"),
-        (&["run", "--inertia", "textbook"], "isotropic, world"),
+        (&["run", "--board", "emulated:quarter"], "naive, float, half"),
+        (&["run", "--board", "emulated:float,textbook"], "isotropic, world"),
     ] {
         let ran = run(arguments);
         assert_eq!(ran.code, Some(2), "{arguments:?}: {}", ran.stdout);

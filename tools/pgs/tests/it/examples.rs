@@ -203,9 +203,8 @@ fn in_small(command: &str) -> Option<String> {
         ("faults", _) if !has(&words, "--list") => return None,
         ("thesis", "--all") => return None,
         ("solve" | "list" | "check" | "faults" | "load" | "serve", _)
-        | ("thesis", "" | "ladder" | "--help" | "detection" | "step" | "data" | "memory") => {}
-        ("thesis", "streams" | "ports" | "warm" | "comparison" | "euler") => {}
-        ("thesis", "mixed" | "windowed") => {}
+        | ("thesis", "" | "ladder" | "--help" | "detection" | "cycles" | "data" | "memory") => {}
+        ("thesis", "warm" | "comparison" | "euler") => {}
         _ if has(&words, "--help") || has(&words, "--version") => {}
         ("thesis", "stopping") => {
             with(&mut words, "--passes", "16");
@@ -285,6 +284,7 @@ fn serve(example: &Example, clients: &[&Example]) {
 fn every_printed_command_runs_in_a_clone_or_names_its_need() {
     let helps = helps();
     let mut examples: Vec<_> = helps.iter().flat_map(|(verb, help)| of_help(verb, help)).collect();
+    examples.extend(of_help(&[], &run(["-h"]).stdout));
     let in_help = examples.len();
     let mut pages = documents();
     pages.push("device-tree/README.md".to_owned());
@@ -306,7 +306,7 @@ fn every_printed_command_runs_in_a_clone_or_names_its_need() {
                 || need
                     .strip_prefix("stage=")
                     .is_some_and(|stage| check.contains(&format!("\n\t[{stage}]=")))
-                || ["on a board", "with the Verilog in simulation (docs/bitstream.md)"]
+                || ["on a board", "with the Verilog in simulation (docs/to-a-board.md)"]
                     .contains(&need.as_str());
             assert!(known, "no such need: {example}");
         } else if is_form(command) || command.starts_with("pgs load ") {

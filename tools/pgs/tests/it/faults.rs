@@ -28,7 +28,7 @@ fn run(more: &[&str]) -> Output {
 /// Tests the design with the fewest cells; `pgs faults` tries the others.
 #[test]
 fn every_fault_at_every_place_of_the_simplest_design_is_met() {
-    let output = pgs(&["faults", "--profile", "naive", "--json"]);
+    let output = pgs(&["faults", "--board", "emulated:naive", "--json"]);
     let found = document(&output);
     let naive = &found["profiles"][0];
     assert_eq!(naive["profile"], "naive");
@@ -49,7 +49,7 @@ fn every_fault_at_every_place_of_the_simplest_design_is_met() {
 
 #[test]
 fn a_cell_can_be_replayed_from_its_line() {
-    let list = String::from_utf8(pgs(&["faults", "--list", "--profile", "float"]).stdout);
+    let list = String::from_utf8(pgs(&["faults", "--list", "--board", "emulated:float"]).stdout);
     let list = list.expect("text");
     let line = "dma-dec-err@dma2.mm2s,phase=contact2,beat=0";
     assert!(list.lines().any(|found| found.ends_with(line)), "{list}");
@@ -62,7 +62,8 @@ fn a_cell_can_be_replayed_from_its_line() {
 
 #[test]
 fn a_list_of_cells_for_programs_is_a_document_with_the_lines_for_people() {
-    let list = |more: &[&str]| pgs(&[&["faults", "--list", "--profile", "naive"], more].concat());
+    let naive = ["faults", "--list", "--board", "emulated:naive"];
+    let list = |more: &[&str]| pgs(&[&naive, more].concat());
     let found = document(&list(&["--json"]));
     let profiles = found["profiles"].as_array().expect("profiles");
     let lines: Vec<String> = profiles
@@ -72,7 +73,7 @@ fn a_list_of_cells_for_programs_is_a_document_with_the_lines_for_people() {
         })
         .map(|(name, cell)| {
             assert!(cell["kind"].is_string() && cell["phase"].is_string(), "{cell}");
-            format!("{:12} {}", name.as_str().expect("text"), cell["fault"].as_str().expect("text"))
+            format!("{} {}", name.as_str().expect("text"), cell["fault"].as_str().expect("text"))
         })
         .collect();
     let text = String::from_utf8(list(&[]).stdout).expect("text");

@@ -30,8 +30,8 @@ fn a_run_writes_the_files_that_it_names() {
         text(&view),
         "--picture",
         text(&picture),
-        "--every",
-        "3",
+        "--fps",
+        "20",
     ];
     let document = ran(&[&files[..], &["--json"]].concat()).json();
     // The start, steps 3 and 6, and the last one.
@@ -61,12 +61,33 @@ fn the_name_of_a_file_tells_its_format() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let begins = |option: &str, name: &str| {
         let path = folder.path().join(name);
-        ran(&[option, text(&path), "--frames", "2"]);
+        ran(&[option, text(&path), "--fps", "10"]);
         String::from_utf8_lossy(&fs::read(&path).expect("a file")[..20]).into_owned()
     };
     assert!(begins("--poses", "a.npz").starts_with("PK\u{3}\u{4}"));
-    assert!(begins("--poses", "a.glb").starts_with("glTF"));
     assert!(begins("--picture", "a.png").starts_with("\u{fffd}PNG"));
+    // An animated PNG is one by its chunk `acTL`, whatever it is called.
+    for (name, moves) in [("still.png", false), ("moving.apng", true), ("moving.apng.png", true)] {
+        begins("--picture", name);
+        let bytes = fs::read(folder.path().join(name)).expect("a file");
+        assert_eq!(bytes.windows(4).any(|chunk| chunk == b"acTL"), moves, "{name}");
+    }
+}
+
+#[test]
+fn the_moving_picture_of_the_pages_is_what_its_command_draws() {
+    const PICTURE: &str = "docs/pile-shapes.apng.png";
+    let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let page = fs::read_to_string(repository.join("docs/command-line.md")).expect("the page");
+    let mut lines = page.lines().filter_map(|line| line.strip_prefix("cargo run --release -- "));
+    let command = lines.find(|line| line.ends_with(PICTURE)).expect("its command");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let drawn = folder.path().join("drawn.apng.png");
+    let words = command.split_whitespace();
+    let ran = run(words.map(|word| if word == PICTURE { text(&drawn) } else { word }));
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let [drawn, kept] = [drawn, repository.join(PICTURE)].map(|path| fs::read(path).expect("it"));
+    assert!(drawn == kept, "{PICTURE} is another picture; draw it anew: {command}");
 }
 
 #[test]
@@ -81,9 +102,9 @@ fn a_file_that_cannot_be_written_is_refused_before_the_run() {
         }
         assert!(!path.exists());
     };
-    refused("--poses", "poses.csv", &["expected a name that ends in .npz or .glb"]);
+    refused("--poses", "poses.csv", &["expected a name that ends in .npz"]);
     refused("--view", "view", &["expected a name that ends in .html"]);
-    refused("--picture", "a.jpg", &["expected a name that ends in .png"]);
+    refused("--picture", "a.jpg", &["expected a name that ends in .png or .apng"]);
     refused(
         "--view",
         "missing/view.html",

@@ -56,7 +56,8 @@ fn solve(folder: &Path, options: &[&str]) -> Value {
 /// Compares one stage of every folder; every array must agree in all bits.
 fn compare(options: &[&str], arrays: usize) {
     for (folder, profile) in folders().iter().flat_map(|it| [(it, "float"), (it, "naive")]) {
-        let all = [&["--compare", "--profile", profile], options].concat();
+        let board = format!("emulated:{profile}");
+        let all = [&["--compare", "--board", &board], options].concat();
         let document = solve(folder, &all);
         let comparison = document["comparison"].as_array().expect("a list");
         assert_eq!(comparison.len(), arrays, "{document}");
@@ -114,7 +115,7 @@ fn the_digest_of_a_run_does_not_change() {
     };
     let as_bullet = "--order as-given --drop 5 --contact-iterations 4 --friction-iterations 4";
     for (options, digest) in [(as_bullet, "f4de4a33a7ed017f"), ("", "1d2a679a4001876f")] {
-        for threads in ["--threads 1", "--threads 2", "--fast off"] {
+        for threads in ["--threads 1", "--threads 2", "--board emulated:float,fast=off"] {
             let document = run(&format!("{options} {threads}"));
             assert_eq!(document["digest"]["value"], digest, "{options} {threads}");
         }
@@ -131,9 +132,8 @@ fn unchecked_hardware_adds_energy_to_the_full_step() {
         return;
     }
     let energy = |document: &Value, key: &str| document[key].as_f64().expect("J") / 1e3;
-    let options =
-        ["--no-integrate", "--hazards", "unchecked", "--window", "64", "--order", "as-given"];
-    let unchecked = solve(&folder, &options);
+    let board = "emulated:float,unchecked,window=64";
+    let unchecked = solve(&folder, &["--no-integrate", "--board", board, "--order", "as-given"]);
     let stale = unchecked["hazard_share"].as_f64().expect("a share") * 100.0;
     assert!((stale - 71.8).abs() <= 0.1, "{stale} % stale");
     let lost = energy(&unchecked, "kinetic_energy_j");

@@ -25,6 +25,8 @@ mod files;
 mod golden;
 mod kill;
 mod list;
+#[cfg(feature = "live")]
+mod live;
 mod load;
 mod model;
 mod order;

@@ -82,7 +82,7 @@ fn the_totals_of_tables_4_1_to_4_6_are_exact() {
 
 #[test]
 fn cycles_meet_tables_6_4_and_6_8_within_0_6_percent() {
-    let document = document(&["step"]);
+    let document = document(&["cycles"]);
     let total = |profile, records| {
         let row = row(&document, "cycles", &[("profile", profile), ("records", records)]);
         (row["total"].as_u64(), row["thesis"].as_u64(), &row["difference_percent"])
@@ -95,19 +95,15 @@ fn cycles_meet_tables_6_4_and_6_8_within_0_6_percent() {
     near(off, -0.375, 0.005);
     assert_eq!(total("float", "streamed").0, Some(2_093_336));
     assert_eq!(total("half", "streamed").0, Some(1_572_861));
-    assert_eq!(total("mixed", "packed").0, Some(1_061_064));
-    assert_eq!(total("mixed", "streamed").0, Some(1_096_704));
     assert_eq!(total("naive", "streamed").0, Some(29_384_064));
 
-    let time = |profile, bandwidth| {
-        let with = [("profile", profile), ("records", "streamed"), ("bandwidth", bandwidth)];
-        row(&document, "time", &with)
+    let time = |profile, key| {
+        row(&document, "cycles", &[("profile", profile), ("records", "streamed")])[key].clone()
     };
-    near(&time("float", "12.8 GB/s")["ms"], 9.290, 0.0005);
-    assert_eq!(time("float", "12.8 GB/s")["pass_limit"], "memory");
-    assert_eq!(time("float", "12.8 GB/s")["difference_percent"], Value::Null);
-    near(&time("half", "unlimited")["thesis_ms"], 6.23, 1e-9);
-    assert_eq!(time("naive", "12.8 GB/s")["pass_limit"], "streams");
+    near(&time("float", "ms_sustained"), 9.290, 0.0005);
+    near(&time("float", "ms_thesis"), 7.711, 0.0005);
+    near(&time("half", "ms_sustained"), 6.313, 0.0005);
+    near(&time("naive", "ms_sustained"), 106.9, 0.05);
 }
 
 #[test]
@@ -133,7 +129,7 @@ fn on_chip_memory_is_that_of_section_4_4_2() {
     let [dsp, lut, ff] = ["dsp", "lut", "ff"].map(|key| logic("half")[key].clone());
     assert_eq!([dsp, lut, ff], [42.0, 49.0, 29.0]);
     assert_eq!(logic("float")["kind"], "recorded");
-    assert_eq!((&logic("mixed")["dsp"], &logic("mixed")["kind"]), (&Value::Null, &json!("open")));
+    assert_eq!((&logic("naive")["dsp"], &logic("naive")["kind"]), (&Value::Null, &json!("open")));
     // Deviation in bits from the thesis' synthesis report.
     near(&blocks("float")["ideal_difference_percent"], 71.49 / 70.0 * 100.0 - 100.0, 0.01);
     near(&blocks("half")["ideal_difference_percent"], 47.31 / 48.0 * 100.0 - 100.0, 0.01);
@@ -142,55 +138,7 @@ fn on_chip_memory_is_that_of_section_4_4_2() {
         let [shaped, thesis] = shares.map(|share| share.expect("a share"));
         near(&blocks(profile)["shaped_difference_percent"], (shaped / thesis - 1.0) * 100.0, 1e-9);
     }
-    assert_eq!(blocks("mixed")["shaped_difference_percent"], Value::Null);
-}
-
-#[test]
-fn every_interval_is_justified_by_ports_and_streams() {
-    let document = document(&["ports"]);
-    for (profile, ports, streams, claimed) in
-        [("naive", 2, 28, 28), ("float", 2, 2, 2), ("half", 3, 3, 3), ("mixed", 1, 1, 1)]
-    {
-        let row = row(&document, "interval", &[("profile", profile)]);
-        let found = ["by_ports", "by_streams", "claimed"].map(|key| row[key].as_u64());
-        assert_eq!(found, [Some(ports), Some(streams), Some(claimed)], "{profile}");
-        assert_eq!(row["justified"], "yes");
-    }
-    let without_pump = |profile| {
-        let rows = table(&document, "copies")["rows"].as_array().expect("rows");
-        let found = rows.iter().find(|row| row["profile"] == profile && row["pump"] == 1);
-        ["one", "two", "three", "many"].map(|key| found.and_then(|row| row[key].as_u64()))
-    };
-    assert_eq!(without_pump("mixed"), [Some(2); 4]);
-    assert_eq!(without_pump("half"), [Some(4), Some(3), Some(3), Some(3)]);
-    let schedule = table(&document, "schedule")["rows"].as_array().expect("rows");
-    let mixed: Vec<_> = schedule
-        .iter()
-        .filter(|row| row["profile"] == "mixed" && row["array"] == "velocities")
-        .map(|row| ["clock", "port_a", "port_b"].map(|key| row[key].clone()))
-        .collect();
-    let expected = [
-        [json!(1), json!("read A"), json!("read B")],
-        [json!(2), json!("write A"), json!("write B")],
-    ];
-    assert_eq!(mixed, expected);
-    let banks = |profile| {
-        &row(&document, "load", &[("profile", profile), ("array", "velocities")])["banks"]
-    };
-    assert_eq!([banks("float"), banks("half"), banks("mixed")], [&json!(1), &json!(2), &json!(1)]);
-}
-
-#[test]
-fn mixed_moves_at_most_half_of_floats_bytes() {
-    let document = document(&["mixed"]);
-    let figure = |name| row(&document, "mixed", &[("figure", name)]);
-    near(&figure("cycles at unlimited")["mixed"], 1_096_704.0, 0.5);
-    near(&figure("cycles at 12.8 GB/s")["mixed"], 1_117_764.0, 0.5);
-    near(&figure("bytes a step")["mixed"], 53_744_640.0, 0.0);
-    near(&figure("bytes a step")["float"], 118_768_640.0, 0.0);
-    near(&figure("bytes a step")["mixed_of_float_percent"], 45.25, 0.005);
-    near(&figure("block RAM, MiB")["mixed"], 2.83, 0.005);
-    near(&figure("cycles a collision")["mixed"], 1.0, 0.0);
+    assert_eq!(blocks("naive")["shaped_difference_percent"], Value::Null);
 }
 
 #[test]
@@ -238,14 +186,10 @@ fn the_comparison_has_what_the_thesis_prints() {
 }
 
 /// The experiments that only calculate, and the ids of their tables.
-const FORMULAS: [(&str, &[&str]); 10] = [
-    ("step", &["cycles", "time", "inertia"]),
-    ("mixed", &["mixed"]),
-    ("windowed", &["window_cycles", "window_gains", "window_logic"]),
+const FORMULAS: [(&str, &[&str]); 6] = [
+    ("cycles", &["cycles"]),
     ("data", &["T4.1", "T4.2", "T4.3", "T4.4", "T4.5", "T4.6", "records"]),
     ("memory", &["memory", "arrays", "blocks", "logic"]),
-    ("streams", &["streams"]),
-    ("ports", &["ports", "interval", "schedule", "copies", "load"]),
     ("warm", &["warm"]),
     ("comparison", &["platforms", "comparison"]),
     ("euler", &["euler"]),
@@ -255,7 +199,7 @@ const FORMULAS: [(&str, &[&str]); 10] = [
 fn the_json_keys_are_stable() {
     for (name, ids) in FORMULAS {
         let document = document(&[name]);
-        assert_eq!((&document["schema"], &document["experiment"]), (&json!(4), &json!(name)));
+        assert_eq!((&document["schema"], &document["experiment"]), (&json!(5), &json!(name)));
         let expected = BTreeSet::from([
             "schema",
             "verb",
@@ -268,7 +212,6 @@ fn the_json_keys_are_stable() {
             "contact_iterations",
             "friction_iterations",
             "thesis_step",
-            "world_inertia",
             "tables",
             "figures",
             "index",
@@ -298,7 +241,7 @@ fn the_json_keys_are_stable() {
 #[test]
 fn another_step_is_not_held_against_the_thesis() {
     let step = ["--bodies", "1000", "--collisions", "3001"];
-    let cycles = document(&[&["step"], &step[..]].concat());
+    let cycles = document(&[&["cycles"], &step[..]].concat());
     let document = document(&[&["data"], &step[..]].concat());
     assert_eq!(document["thesis_step"], false);
     let after = row(&document, "T4.1", &[("state", "after")]);
@@ -311,42 +254,6 @@ fn another_step_is_not_held_against_the_thesis() {
 }
 
 #[test]
-fn world_inertia_costs_cycles_and_memory() {
-    let options = ["--profile", "float", "--world-inertia"];
-    let document = document(&[&["step"], &options[..]].concat());
-    let streamed = row(&document, "cycles", &[("profile", "float"), ("records", "streamed")]);
-    assert_eq!(streamed["load"], 38_880);
-    let cost = row(&document, "inertia", &[("profile", "float")]);
-    assert_eq!(
-        (&cost["cycles_without"], &cost["cycles_with"]),
-        (&json!(2_093_336), &json!(2_112_888))
-    );
-    let document = self::document(&[&["ports"], &options[..]].concat());
-    let inertia = row(&document, "ports", &[("array", "world inertia")]);
-    assert_eq!(inertia["interval"], 1);
-}
-
-/// O4: bytes at most a sixth and an eleventh of float's, MiB on chip; nothing is measured.
-#[test]
-fn the_designs_that_stream_once_move_and_hold_what_they_must() {
-    let document = document(&["windowed", "--profile", "windowed16"]);
-    let gains = row(&document, "window_gains", &[("profile", "windowed16")]);
-    let number = |key: &str| gains[key].as_f64().expect("a number");
-    assert!(11.0 * number("bytes") <= number("float_bytes"));
-    assert!(number("mib") <= 1.2 && number("ms_sustained") < 2.0);
-    let cycles = row(&document, "window_cycles", &[("profile", "windowed16")]);
-    // (127,000 + 7 x 2,816) x 3 + 306, and the fill of the integration at the end.
-    assert_eq!((&cycles["slot"], &cycles["passes"]), (&json!(3), &json!(440_442)));
-    assert_eq!((&cycles["load"], &cycles["integration"]), (&json!(38_880), &json!(77_760)));
-    let logic = row(&document, "window_logic", &[("profile", "windowed16")]);
-    assert_eq!((&logic["dsp"], &logic["lookup_tables"]), (&json!(84.0), &json!(98.0)));
-    let document = self::document(&["windowed", "--profile", "windowed"]);
-    let gains = row(&document, "window_gains", &[("profile", "windowed")]);
-    let number = |key: &str| gains[key].as_f64().expect("a number");
-    assert!(6.0 * number("bytes") <= number("float_bytes") && number("mib") <= 2.2);
-}
-
-#[test]
 fn the_text_is_aligned_and_fits_a_wide_terminal() {
     for (name, _) in FORMULAS {
         let ran = thesis(&[name]);
@@ -356,7 +263,7 @@ fn the_text_is_aligned_and_fits_a_wide_terminal() {
             assert_eq!(line, line.trim_end());
         }
     }
-    let text = thesis(&["step"]).stdout;
+    let text = thesis(&["cycles"]).stdout;
     let mut words = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
     let float = ["float", "packed", "14,580", "254,000", "2,752"];
     assert!(words.any(|words| words.starts_with(&float)), "{text}");
@@ -406,25 +313,22 @@ fn a_warm_start_costs_a_quarter_of_the_cycles_and_a_third_of_the_bytes_at_most()
     let other = of("in the first pass (not built)");
     near(&other["more_cycles_percent"], 0.0, 0.0);
     near(&other["more_bytes_percent"], 6.8, 0.1);
-    for (profile, cycles, bytes) in [("half", 32.3, 34.2), ("mixed", 46.4, 37.8)] {
-        let keys = [("profile", profile), ("applied", "in a pass in front of each kind")];
-        let chosen = row(&document, "warm", &keys);
-        near(&chosen["more_cycles_percent"], cycles, 0.1);
-        near(&chosen["more_bytes_percent"], bytes, 0.1);
-    }
+    let keys = [("profile", "half"), ("applied", "in a pass in front of each kind")];
+    let chosen = row(&document, "warm", &keys);
+    near(&chosen["more_cycles_percent"], 32.3, 0.1);
+    near(&chosen["more_bytes_percent"], 34.2, 0.1);
 }
 
 #[test]
 fn what_excludes_each_other_is_refused_with_2() {
     for (arguments, said) in [
-        (&["step", "--json", "--markdown"][..], "exclude each other"),
-        (&["mixed", "--profile", "half"], "nothing about half"),
-        (&["windowed", "--profile", "mixed"], "another --profile"),
-        (&["warm", "--profile", "windowed"], "nothing about windowed"),
-        (&["step", "--profile", "quarter"], "naive, float, half, mixed, windowed, windowed16, all"),
+        (&["cycles", "--json", "--markdown"][..], "exclude each other"),
+        (&["cycles", "--profile", "quarter"], "naive, float, half, all"),
         (&["tables"], "tables"),
-        (&["step", "--bodies", "5"], "--collisions"),
-        (&["step", "--bandwidth", "0"], "GB/s"),
+        (&["cycles", "--bodies", "5"], "--collisions"),
+        (&["step", "--input", "x", "--grid", "2x2x2"], "--grid"),
+        (&["step", "--input", "/nonexistent"], "/nonexistent"),
+        (&["step", "--grid", "2x2x2", "--picture", "/nonexistent/a.svg"], "expected a folder"),
         (&["--all"], "--out"),
     ] {
         let ran = thesis(arguments);

@@ -84,9 +84,9 @@ fn a_gpu_order_that_is_no_permutation_is_refused() {
 
 /// A board without a queue takes the cheaper order of each step, and each step's report names it.
 #[test]
-fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
-    let scene = ["run", "--profile", "half", "--grid", "1x3x1", "--steps", "80", "--drop", "0.3"];
-    let ran = run([&["--json"], &scene[..]].concat());
+fn each_step_of_a_run_says_its_order() {
+    let scene = "run --json --board emulated:half --grid 1x3x1 --steps 80 --drop 0.3";
+    let ran = run(scene.split(' '));
     let document = ran.json();
     let steps = document["steps"].as_array().expect("steps");
     let mut counted = Vec::<(&str, u32)>::new();
@@ -96,14 +96,11 @@ fn a_run_whose_steps_have_several_orders_says_how_many_had_each() {
             None => counted.push((name, 1)),
         }
     }
-    let [(first, some), (other, rest)] = counted[..] else { panic!("{counted:?}") };
-    let expected = format!("\norders     of 80 steps {first} in {some}, {other} in {rest}\n");
-    let text = run(scene).stdout;
-    assert!(text.contains(&expected), "{text}");
+    assert!(counted.len() == 2 && counted.iter().all(|(_, steps)| *steps > 0), "{counted:?}");
 
-    let short = ["run", "--hazards", "unchecked", "--grid", "3x3x3", "--steps", "3"];
+    let short = ["run", "--board", "emulated:float,unchecked", "--grid", "3x3x3", "--steps", "3"];
     let one = run([&short[..], &["--order", "hazard-free"]].concat()).stdout;
-    assert!(one.contains("order      hazard-free\n") && !one.contains("orders"), "{one}");
+    assert!(one.contains("order      hazard-free\n"), "{one}");
 }
 
 /// `full_step186`, if it exists; reports once if it does not.

@@ -70,6 +70,19 @@ fn a_name_that_is_taken_by_a_folder_leaves_the_other_results() {
     assert_eq!(content(folder.path()), [("out_pos.npy".to_owned(), b"earlier".to_vec())]);
 }
 
+/// A step that misses its deadline.
+const SLOW: [&str; 9] = [
+    "run",
+    "--board",
+    "emulated:float,bandwidth=0.1",
+    "--grid",
+    "6x6x6",
+    "--steps",
+    "1",
+    "--deadline",
+    "1",
+];
+
 #[test]
 fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -77,8 +90,7 @@ fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
     fs::write(&report, "earlier").expect("written");
     let before = content(folder.path());
 
-    let late = ["run", "--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1", "--deadline", "1"];
-    let late = [&late[..], &["--report", text(&report)]].concat();
+    let late = [&SLOW[..], &["--report", text(&report)]].concat();
     let ran = on_a_full_disk(&late);
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
     assert!(ran.stderr.contains("fault.json cannot be written"), "{}", ran.stderr);
@@ -91,8 +103,7 @@ fn a_report_that_cannot_be_written_leaves_the_earlier_one() {
 
 #[test]
 fn a_report_may_go_to_a_device() {
-    let late = ["run", "--grid", "6x6x6", "--steps", "1", "--bandwidth", "0.1", "--deadline", "1"];
-    let ran = run(late.iter().chain(&["--report", "/dev/null"]));
+    let ran = run(SLOW.iter().chain(&["--report", "/dev/null"]));
     assert_eq!(ran.code, Some(4), "{}", ran.stderr);
     assert!(ran.stderr.contains("for a bug report, see /dev/null"), "{}", ran.stderr);
     assert!(!fs::metadata("/dev/null").expect("there").is_file());
@@ -107,7 +118,6 @@ fn every_file_that_finds_no_room_has_a_next_step() {
     let (run, solve) = (vec!["run", "--grid", "4x4x4", "--steps", "2"], vec!["solve", text(&step)]);
     for (verb, option, name) in [
         (&run, "--poses", "poses.npz"),
-        (&run, "--poses", "poses.glb"),
         (&run, "--view", "page.html"),
         (&run, "--picture", "last.png"),
         (&run, "--trace", "step.json"),
@@ -154,7 +164,7 @@ fn an_output_that_is_another_output_or_an_input_is_refused_before_the_run() {
     assert_eq!(run(["solve", input, "--out", &out]).code, Some(0));
 }
 
-/// What a program prints and what it writes to the file behind stdout would destroy each other.
+/// The text of a program and the bytes of the same file behind stdout would destroy each other.
 #[test]
 fn an_output_that_is_the_file_of_stdout_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");

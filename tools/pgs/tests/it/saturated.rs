@@ -19,12 +19,13 @@ fn impulses_beyond_the_counter_are_at_least_its_maximum() {
     }
     let folder = folder.path().to_str().expect("a path in UTF-8");
     for profile in ["float", "naive"] {
-        let ran = run(["solve", folder, "--profile", profile]);
+        let board = format!("emulated:{profile}");
+        let ran = run(["solve", folder, "--board", &board]);
         assert_eq!(ran.code, Some(0), "{profile}: {}", ran.stderr);
         let line = ran.stdout.lines().find(|line| line.starts_with("impulses"));
         let expected = "impulses   at least 17,592,186,044,416 N s";
         assert_eq!(line, Some(expected), "{profile}");
-        let step = &json(&["solve", folder, "--profile", profile])["step"];
+        let step = &json(&["solve", folder, "--board", &board])["step"];
         assert_eq!(step["impulse_sum_n_s"], Value::Null, "{profile}");
         assert_eq!(step["impulse_sum_saturated"], true, "{profile}");
     }

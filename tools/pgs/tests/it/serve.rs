@@ -80,16 +80,6 @@ fn a_served_board_gives_the_digest_of_the_emulated_one() {
     let check: Ran =
         served.command(&served.socket()).arg("check").output().expect("it runs").into();
     assert!(check.stdout.ends_with("12 ok, 0 failed, 1 skipped\n"), "{}", check.stdout);
-    // The server's options describe the build.
-    let half: Ran = served
-        .command(&served.socket())
-        .args(["run", "--profile", "half"])
-        .output()
-        .expect("it runs")
-        .into();
-    assert_eq!(half.code, Some(2));
-    assert!(half.stderr.contains("give --profile to its `pgs serve`"), "{}", half.stderr);
-
     let ended = served.end();
     assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
     let last = ended.stdout.lines().last().expect("a summary").to_owned();
@@ -123,8 +113,8 @@ fn where_no_board_is_served_there_is_none() {
     };
     for (rest, reason) in [
         (&["--memory", "uio"][..], "similar argument exists: '--memory-mib'"),
-        (&["--board", "uio"], "unexpected argument '--board'"),
-        (&["--profile", "half", "--inertia", "world"], "take float"),
+        (&["--board", "uio"], "this command builds its board itself: give emulated[:BUILD]"),
+        (&["--board", "emulated:half,world"], "take float"),
     ] {
         let ran = serve(rest);
         assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{rest:?}");
@@ -291,7 +281,7 @@ fn memory_behind_the_fence_and_a_socket_that_is_the_simulator_are_refused_by_the
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);
         assert!(said.iter().all(|said| ran.stderr.contains(said)), "{}", ran.stderr);
     };
-    let fenced = ["--fence", "0x50000000+64M", "--memory-mib", "128"];
+    let fenced = ["--board", "emulated:float,fence=0x50000000+64M", "--memory-mib", "128"];
     refused(&fenced, &["134217728 bytes", "0x50000000", "smaller --memory-mib"]);
     assert!(!socket.exists());
     std::fs::write(&socket, "a program").expect("written");

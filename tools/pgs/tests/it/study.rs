@@ -89,7 +89,8 @@ fn orders_lead_further_apart_step_by_step_and_the_same_way_every_time() {
     assert!(gpu(5) <= 0.0 && pairs(5) <= 0.0, "{} {}", gpu(5), pairs(5));
     assert!(gpu(70) > 2.0 * gpu(12) && gpu(12) > 0.0, "{} {}", gpu(12), gpu(70));
     assert!(pairs(12) > 0.0, "{}", pairs(12));
-    let again = study(&[&scene[..], &["--threads", "1", "--fast", "off"]].concat());
+    let again =
+        study(&[&scene[..], &["--board", "emulated:float,fast=off", "--threads", "1"]].concat());
     assert_eq!(again["tables"], document["tables"]);
 
     // The state after some steps is the start of others.
@@ -240,7 +241,10 @@ fn what_cannot_be_studied_is_refused() {
     let input = golden("pile5_step60");
     let input = text(&input);
     for (arguments, part) in [
-        (&["determinism", "--input", input, "--hazards", "unchecked"][..], "stale velocities"),
+        (
+            &["determinism", "--input", input, "--board", "emulated:float,unchecked"][..],
+            "stale velocities",
+        ),
         (&["determinism", "--input", input, "--steps", "3"], "cannot be used with"),
         (&["half", "--input", input, "--grid", "2x2x2"], "cannot be used with"),
         (&["half", "--grid", "2x2x2", "--board", "uio"], "unexpected argument '--board'"),

@@ -43,7 +43,7 @@ fn every_command_does_with_fewer_threads() {
         &["thesis", "formats", "--grid", "3x3x3", "--step", "2"],
         &["thesis", "order", "--input", &cube],
         &["check"],
-        &["faults", "--profile", "naive", "--json"],
+        &["faults", "--board", "emulated:naive", "--json"],
     ] {
         let mut command = pgs();
         command.args(arguments);

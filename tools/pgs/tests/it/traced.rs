@@ -11,8 +11,8 @@ use serde_json::Value;
 use crate::common::{golden, pgs, run, signal, text};
 
 /// The arguments that the page of the command line gives for the picture.
-const PICTURE: &str = "run --grid 6x6x6 --steps 40 --contact-iterations 4 --friction-iterations 4 \
-                       --board emulated --timeline docs/step.svg";
+const PICTURE: &str = "run --grid 36x26x36 --drop 0 --steps 3 --contact-iterations 4 --friction-iterations 4 --board \
+     emulated:float,bandwidth=16 --timeline docs/step.svg";
 
 fn repository() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))

@@ -23,17 +23,14 @@ Examples:
   pgs thesis compare half,f32 half --steps 300 --every 10 --json
   pgs thesis compare float,world float,world,unchecked --scene shapes --grid 8x8x8
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs thesis compare float float --grid 2x2x2 --steps 3 --accelerator \
   rtl:rtl-sim/pgs-rtl
 
-A and B are builds of the emulated board: a profile, and changes of its defaults after commas. A
-change is a word: f32, binary16 (arithmetic), interlocked, unchecked, isotropic, world; or \
-queue=DEPTH, window=SLOTS,
-bandwidth=GBPS, length-width=BITS, address-width=BITS, threads=N and
-fast=on|off. The order of a board's collisions is one of auto, as-given, interleaved,
-hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, gpu,
-random=SEED (another one in each step). Without an order, a board that waits on hazards takes the
+A and B are builds of the emulated board, as behind `--board emulated:` of `pgs run`, whose --help
+tells the words. The order of a board's collisions is one word more: auto, as-given, interleaved,
+hazard-free, body-by-body, body-by-body-oldest, body-by-body-newest, gpu, random=SEED (another one
+in each step). Without an order, a board that waits on hazards takes the
 collisions as given, so that two such boards solve them in the same order. Each board detects its
 own collisions. `--accelerator` gives board B another accelerator; board A keeps the built-in
 model.
@@ -103,12 +100,11 @@ impl Measure for CompareArgs {
         let common = session.emulated();
         let mut start = Start::load(&self.start)?;
         start.parameters.verify_order |= self.verify;
-        let model = CommonArgs { accelerator: AcceleratorChoice::Model, ..common.clone() };
+        let model = CommonArgs { accelerator: AcceleratorChoice::default(), ..common.clone() };
         let (mut boards, mut orders) = (Vec::new(), Vec::new());
         for (name, spec, common) in [("A", self.a, &model), ("B", self.b, &common)] {
             let about = |failure: Failure| failure.about(format!("board {name} ({spec})"));
-            let opened =
-                start.open(&spec.build, spec.build.config(), common, session).map_err(about)?;
+            let opened = start.open(spec.build.config(), common, session).map_err(about)?;
             let capabilities = opened.accelerator.capabilities();
             orders.push((
                 name,

@@ -8,12 +8,9 @@
 //! This is a step in the order of the stream, as the thesis has it: an issue queue adds its filling
 //! to each pass (interface specification, cycles).
 //!
-//! A design that streams the collisions once has a formula of its own ([`Window`]).
-//!
 //! Source: thesis Tables 6.4 and 6.8, which the formula meets within 0.6 %; the fills are this
 //! project's.
 
-use super::designs::Window;
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
 use pgs_interface::profile::{Profile, Variant};
@@ -21,16 +18,15 @@ use pgs_interface::profile::{Profile, Variant};
 /// Clock cycles of a step by the formula, part by part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCycles {
-    /// Velocities in; 0 where they come beside the passes.
+    /// Velocities in.
     pub load: u64,
-    /// One pass over the collisions, without fill; all passes where they run side by side.
+    /// One pass over the collisions, without fill.
     pub pass: u64,
-    /// Fill of all passes together. Where they run side by side: the fill of the last pass, and the
-    /// cycles by which it is behind the first if the order needs the whole of the delay lines.
+    /// Fill of all passes together.
     pub fill: u64,
-    /// Poses in; 0 where they come beside the passes.
+    /// Poses in.
     pub pose_in: u64,
-    /// Results out; 0 where they leave beside the passes.
+    /// Results out.
     pub result_out: u64,
     /// Fill of the integration: from the last body in to the end of the step.
     pub integration_fill: u64,
@@ -45,24 +41,19 @@ impl StepCycles {
         let profile = variant.profile;
         let traffic = StepTraffic::new(variant, records, step);
         let [contact, friction] = [variant.contact(), variant.friction()].map(|kind| kind.fill);
-        let (pass, fill, beside) = match Window::of(profile) {
-            None => {
-                let issues = step.collisions.div_ceil(profile.collisions_per_issue.into());
-                let fill = step.contact_iterations * u64::from(contact)
-                    + step.friction_iterations * u64::from(friction);
-                (issues * u64::from(profile.initiation_interval), fill, false)
-            }
-            Some(design) => {
-                let pass = step.collisions * design.slot(profile, step);
-                (pass, design.behind(profile, step) + u64::from(friction), true)
+        let issues = step.collisions.div_ceil(profile.collisions_per_issue.into());
+        let pass = issues * u64::from(profile.initiation_interval);
+        let fill = match step.passes() {
+            0 => 0,
+            _ => {
+                step.contact_iterations * u64::from(contact)
+                    + step.friction_iterations * u64::from(friction)
             }
         };
-        let fill = if step.passes() == 0 { 0 } else { fill };
-        let alone = |cycles| if beside { 0 } else { cycles };
-        let load = alone(traffic.velocities.cycles);
-        let (pose_in, result_out) = (alone(traffic.poses.cycles), alone(traffic.results.cycles));
+        let load = traffic.velocities.cycles;
+        let (pose_in, result_out) = (traffic.poses.cycles, traffic.results.cycles);
         let integration_fill = u64::from(profile.integration_fill);
-        let passes = pass * traffic.collision_streams + fill;
+        let passes = pass * step.passes() + fill;
         let total = load + passes + pose_in.max(result_out) + integration_fill;
         Self { load, pass, fill, pose_in, result_out, integration_fill, total }
     }
@@ -83,7 +74,6 @@ impl StepCycles {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::MIXED;
     use crate::estimate::thesis;
     use pgs_interface::profile::{FLOAT, HALF, NAIVE};
 
@@ -133,9 +123,6 @@ mod tests {
         let half = cycles(&HALF, Records::Streamed);
         assert_eq!(parts(&half), [15_552, 190_500, 2_028, 15_552, 31_104, 177]);
         assert_eq!(half.total, 1_572_861);
-        let mixed = cycles(&MIXED, Records::Streamed);
-        assert_eq!(parts(&mixed), [25_920, 127_000, 2_680, 25_920, 51_840, 264]);
-        assert_eq!(mixed.total, 1_096_704);
         // Eight words a velocity, sixteen a result, one a cycle.
         let naive = cycles(&NAIVE, Records::Streamed);
         assert_eq!(parts(&naive), [311_040, 3_556_000, 2_680, 311_040, 622_080, 264]);

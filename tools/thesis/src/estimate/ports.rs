@@ -8,29 +8,12 @@
 //! ```text
 //! II by ports = ceil((reads / copies + writes) x collisions per issue / (2 x pump))
 //!   float  (2 / 1 + 2) x 1 / 2 = 2        half   (2 / 2 + 2) x 2 / 2 = 3
-//!   mixed  (2 / 1 + 2) x 1 / 4 = 1        naive  (2 / 1 + 2) x 1 / 2 = 2, its stream needs 28
+//!   naive  (2 / 1 + 2) x 1 / 2 = 2, its stream needs 28
 //! ```
-//!
-//! Without its pump `mixed` could not issue every cycle with any number of copies: (2 / n + 2) / 2
-//! stays above 1 (thesis §5.5.3). The pump is a design assumption of this project that no synthesis
-//! has confirmed.
-//!
-//! Where the passes run side by side, every unit has a memory of its own. The unit reads and writes
-//! the bodies of an entry there, and the previous pass writes its last uses there:
-//!
-//! ```text
-//!   windowed  (2 + 2 + 2) x 1 / 4 = 2     windowed16  (2 + 2 + 2) x 2 / 4 = 3
-//! ```
-//!
-//! The alternative, not taken: banks by body colour, so that the two bodies of a collision never
-//! share a bank. A bank then takes one read and one write a cycle and needs neither copy nor pump.
-//! But the driver would have to find the colours (2 banks are enough for some steps, piles need 5
-//! to 6), the colours would bind the order of the collisions, and the banks would be filled
-//! unevenly.
 
-use super::designs::{OnChipArray, Window};
+use super::arrays::OnChipArray;
 use super::step::StepShape;
-use super::traffic::{Records, StepTraffic, issues_of_an_entry};
+use super::traffic::{Records, StepTraffic};
 use pgs_interface::profile::{Inertia, Variant};
 
 /// Ports of a block RAM.
@@ -81,24 +64,6 @@ impl PortUse {
     }
 }
 
-/// Writes to an array of bodies while the velocities come in, against the ports that write them.
-///
-/// Each record is one row of every array of bodies, in every copy. Block RAM writes a row on each
-/// of its ports. If that is too slow, the array needs banks by body number. Banks take no more
-/// bits, and the passes lose nothing: at worst all accesses of an issue go to one bank, which has
-/// the ports of the undivided array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LoadPorts {
-    /// The array.
-    pub array: OnChipArray,
-    /// Cycles that the streams take.
-    pub by_streams: u64,
-    /// Cycles that the ports take with all bodies in one bank.
-    pub by_ports: u64,
-    /// Banks with which the ports are as fast as the streams.
-    pub banks: u64,
-}
-
 /// The ports of a variant of a profile.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PortAccount {
@@ -127,14 +92,7 @@ impl PortAccount {
         // No other array needs copies or a pump.
         let plain = velocities.with(1, 1);
         let once = |array| PortUse { array, reads: 1, writes: 1, ..plain };
-        let mut arrays = match Window::of(profile) {
-            None => vec![velocities, once(OnChipArray::Impulses)],
-            Some(_) => vec![
-                PortUse { writes: 4, ..velocities },
-                once(OnChipArray::ContactLines),
-                once(OnChipArray::FrictionLines),
-            ],
-        };
+        let mut arrays = vec![velocities, once(OnChipArray::Impulses)];
         if variant.inertia == Inertia::World {
             arrays.push(PortUse { array: OnChipArray::Inertia, writes: 0, ..plain });
         }
@@ -161,40 +119,21 @@ impl PortAccount {
     pub fn velocities(&self) -> &PortUse {
         &self.arrays[0]
     }
-
-    /// The load of `bodies` bodies on the ports of each array of bodies.
-    #[must_use]
-    pub fn load(&self, variant: &Variant, bodies: u64) -> Vec<LoadPorts> {
-        let step = StepShape::new(bodies, 0);
-        let traffic = StepTraffic::new(variant, Records::Streamed, &step);
-        let by_streams = traffic.velocities.cycles;
-        let of_bodies = self.arrays.iter().filter(|ports| ports.array.is_of_bodies());
-        of_bodies
-            .map(|ports| {
-                let by_ports = bodies.div_ceil(u64::from(PORTS * ports.pump));
-                let banks = by_ports.div_ceil(by_streams.max(1)).max(1);
-                LoadPorts { array: ports.array, by_streams, by_ports, banks }
-            })
-            .collect()
-    }
 }
 
-/// Cycles of the busiest stream for one issue, averaged over whole groups of beats. Where the
-/// passes run side by side, an entry is streamed once and issued several times.
+/// Cycles of the busiest stream for one issue, averaged over whole groups of beats.
 fn stream_interval(variant: &Variant) -> u32 {
     let profile = variant.profile;
     let issues = profile.stripes.collisions.streams.len() as u64;
     let step = StepShape::new(0, issues * u64::from(profile.collisions_per_issue));
     let cycles = StepTraffic::new(variant, Records::Streamed, &step).collisions.cycles;
-    let interval = cycles.div_ceil(issues * issues_of_an_entry(profile));
-    u32::try_from(interval).unwrap_or(u32::MAX)
+    u32::try_from(cycles.div_ceil(issues)).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::{DESIGNS, MIXED};
-    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, PROFILES, Profile};
 
     fn account(profile: &'static Profile) -> PortAccount {
         PortAccount::new(&profile.default_variant())
@@ -208,24 +147,14 @@ mod tests {
         };
         assert_eq!(both(&FLOAT), (2, 2));
         assert_eq!(both(&HALF), (3, 3));
-        assert_eq!(both(&MIXED), (1, 1));
         assert_eq!(both(&NAIVE), (2, 28));
-        for profile in DESIGNS {
+        for profile in PROFILES {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let account = PortAccount::new(&variant);
                 assert_eq!(account.smallest(), profile.initiation_interval, "{}", profile.name);
                 assert_eq!(account.claimed, profile.initiation_interval);
             }
-        }
-    }
-
-    #[test]
-    fn without_the_pump_no_number_of_copies_lets_mixed_issue_every_cycle() {
-        let account = account(&MIXED);
-        let velocities = account.velocities();
-        for copies in 1..1000 {
-            assert_eq!(velocities.with(copies, 1).interval(), 2, "{copies} copies");
         }
     }
 
@@ -236,20 +165,5 @@ mod tests {
         let velocities = account.velocities();
         let interval = |copies| velocities.with(copies, 1).interval();
         assert_eq!([interval(1), interval(2), interval(3), interval(1000)], [4, 3, 3, 3]);
-    }
-
-    #[test]
-    fn some_arrays_need_banks_to_be_loaded_as_fast_as_the_streams() {
-        let load =
-            |profile: &'static Profile| account(profile).load(&profile.default_variant(), 38_880);
-        let half = load(&HALF);
-        assert_eq!((half[0].array, half[0].by_streams), (OnChipArray::Velocities, 15_552));
-        assert_eq!((half[0].by_ports, half[0].banks), (19_440, 2));
-        assert_eq!((half[1].array, half[1].by_ports), (OnChipArray::ShapeIndices, 19_440));
-        let banks = |profile| load(profile).iter().map(|load| load.banks).collect::<Vec<_>>();
-        assert_eq!(banks(&NAIVE), [1, 1]);
-        assert_eq!(banks(&FLOAT), [1, 1]);
-        assert_eq!(banks(&HALF), [2, 2]);
-        assert_eq!(banks(&MIXED), [1, 1]);
     }
 }

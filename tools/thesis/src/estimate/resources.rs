@@ -2,11 +2,9 @@
 //!
 //! Source: thesis §4.4.2 (24 bytes a body and 16 a collision; 4.0 MiB on the XCZU9EG).
 
+use super::arrays::OnChipArray;
 use super::blocks::{BLOCK_BITS, ShapedBlocks};
-use super::designs::{OnChipArray, Window};
 use super::ports::{PortAccount, PortUse};
-use super::step::StepShape;
-use super::traffic::RELATIVE_NUMBERS;
 use pgs_interface::profile::Variant;
 
 /// Numbers of a velocity, and of a world inverse inertia.
@@ -26,7 +24,7 @@ pub struct ArrayUse {
     pub rows: u64,
     /// Bytes of a row.
     pub row_bytes: u32,
-    /// Copies of the array. Where the passes run side by side: memories, one for each unit or pass.
+    /// Copies of the array.
     pub copies: u32,
     /// Whether one read port and one write port are enough for every issue.
     pub simple: bool,
@@ -71,34 +69,21 @@ impl MemoryUse {
     /// On-chip memory of `bodies` bodies and `collisions` collisions in a variant of a profile.
     #[must_use]
     pub fn new(variant: &Variant, bodies: u64, collisions: u64) -> Self {
-        let (profile, memory) = (variant.profile, variant.profile.memory);
+        let memory = variant.profile.memory;
         let number = variant.numbers.velocities.bytes();
         let impulses = FOUR * variant.numbers.impulses.bytes();
-        let window = Window::of(profile);
-        let line = |words| words * variant.numbers.collisions.bits() / BITS_PER_BYTE + impulses;
-        let StepShape { contact_iterations, friction_iterations, .. } = StepShape::new(0, 0);
         let of_array = |ports: PortUse| {
-            let (row_bytes, lines) = match ports.array {
-                OnChipArray::Velocities | OnChipArray::Inertia => (SIX * number, 0),
-                OnChipArray::Impulses => (impulses, 0),
-                OnChipArray::ShapeIndices => (memory.shape_index_bytes, 0),
-                // A contact line lies between two contact passes; a friction line leads into each
-                // friction pass, without the four distances.
-                OnChipArray::ContactLines => (line(RELATIVE_NUMBERS), contact_iterations - 1),
-                OnChipArray::FrictionLines => (line(RELATIVE_NUMBERS - FOUR), friction_iterations),
+            let row_bytes = match ports.array {
+                OnChipArray::Velocities | OnChipArray::Inertia => SIX * number,
+                OnChipArray::Impulses => impulses,
+                OnChipArray::ShapeIndices => memory.shape_index_bytes,
             };
-            let (rows, copies) = match (window, ports.array.is_of_bodies()) {
-                (None, true) => (bodies, ports.copies),
-                (None, false) => (collisions, ports.copies),
-                // A memory for each unit.
-                (Some(of), true) => ((of.slots / (2 * of.units)).into(), 2 * of.units),
-                (Some(of), false) => (of.lag.into(), u32::try_from(lines).unwrap_or(u32::MAX)),
-            };
-            ArrayUse { array: ports.array, rows, row_bytes, copies, simple: ports.simple() }
+            let rows = if ports.array.is_of_bodies() { bodies } else { collisions };
+            let (array, copies, simple) = (ports.array, ports.copies, ports.simple());
+            ArrayUse { array, rows, row_bytes, copies, simple }
         };
         let arrays = PortAccount::new(variant).arrays.into_iter().map(of_array).collect();
         let position = THREE * number * memory.velocity_copies;
-        let bodies = window.map_or(bodies, |design| design.slots.into());
         let (capacity, positions) = (memory.bytes.into(), bodies * u64::from(position));
         Self { arrays, capacity, positions }
     }
@@ -144,13 +129,9 @@ impl MemoryUse {
         self.block_ram() <= self.capacity
     }
 
-    /// Collisions that fit beside `bodies` bodies. In a design that keeps no impulses of all
-    /// collisions on chip, the pass counters are the limit.
+    /// Collisions that fit beside `bodies` bodies.
     #[must_use]
     pub fn collisions_beside(variant: &Variant, bodies: u64) -> u64 {
-        if Window::of(variant.profile).is_some() {
-            return Window::COLLISIONS_MAX.into();
-        }
         let taken = bodies * u64::from(variant.bytes_per_body());
         let free = u64::from(variant.profile.memory.bytes).saturating_sub(taken);
         free / u64::from(variant.bytes_per_collision().max(1))
@@ -160,8 +141,7 @@ impl MemoryUse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::{DESIGNS, MIXED};
-    use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, Profile};
+    use pgs_interface::profile::{FLOAT, HALF, Inertia, NAIVE, PROFILES, Profile};
 
     fn thesis_step(profile: &'static Profile) -> MemoryUse {
         MemoryUse::new(&profile.default_variant(), 38_880, 127_000)
@@ -186,9 +166,7 @@ mod tests {
         assert_eq!(hundredths_of_mib(half.with_positions()), 230);
         assert_eq!(hundredths_of_mib(half.positions / 2), 22);
         assert_eq!(hundredths_of_mib(half.block_ram() - half.arrays[0].bytes() / 2), 141);
-        for profile in [&MIXED, &NAIVE] {
-            assert_eq!(thesis_step(profile).block_ram(), float.block_ram(), "{}", profile.name);
-        }
+        assert_eq!(thesis_step(&NAIVE).block_ram(), float.block_ram());
     }
 
     /// By hand: float 38 x 11 + 63 x 15, half 2 x 19 x 11 + 125 x 4, and 19 of shape indices: two
@@ -206,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_arrays_are_what_the_interface_counts_for_each_record() {
-        for profile in DESIGNS.iter().filter(|profile| Window::of(profile).is_none()) {
+        for profile in PROFILES {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let memory = MemoryUse::new(&variant, 7, 5);

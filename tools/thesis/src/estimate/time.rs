@@ -1,39 +1,13 @@
 //! Time of a step under a memory bandwidth.
 //!
 //! Each part of a step takes the longer of computation and transfer: the velocities in, each pass,
-//! and the poses in with the results out. Fill is added, because nothing streams meanwhile. Where
-//! the passes run side by side, all records stream beside them and count in their part.
+//! and the poses in with the results out. Fill is added, because nothing streams meanwhile.
 
 use super::cycles::StepCycles;
-use super::designs::Window;
-use super::ports::PortAccount;
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
 use bitstream_model::Bandwidth;
 use pgs_interface::profile::Variant;
-
-/// The limit on the speed of a part of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PartLimit {
-    /// The width of the streams.
-    Streams,
-    /// The initiation interval.
-    Pipeline,
-    /// The memory bandwidth.
-    Memory,
-}
-
-impl PartLimit {
-    /// Name in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Streams => "streams",
-            Self::Pipeline => "pipeline",
-            Self::Memory => "memory",
-        }
-    }
-}
 
 /// Time of one part of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +16,6 @@ pub struct PartTime {
     pub seconds: f64,
     /// Bytes that the part moves, in and out.
     pub bytes: u64,
-    /// The limit on its speed.
-    pub limit: PartLimit,
 }
 
 /// Time of a step under a memory bandwidth.
@@ -73,54 +45,31 @@ impl StepTime {
         let cycles = StepCycles::new(variant, records, step);
         let traffic = StepTraffic::new(variant, records, step);
         let clock_hz = f64::from(variant.profile.clock_khz) * 1e3;
-        let part = |cycles: u64, bytes: u64, own: PartLimit| {
+        let part = |cycles: u64, bytes: u64| {
             let compute = cycles as f64 / clock_hz;
             let moving = match bandwidth {
                 Bandwidth::Unlimited => 0.0,
                 Bandwidth::BytesPerSecond(rate) => bytes as f64 / rate as f64,
             };
-            if moving > compute {
-                PartTime { seconds: moving, bytes, limit: PartLimit::Memory }
-            } else {
-                PartTime { seconds: compute, bytes, limit: own }
-            }
+            PartTime { seconds: if moving > compute { moving } else { compute }, bytes }
         };
-        let (first, each, last) = match Window::of(variant.profile) {
-            Some(_) => (0, traffic.bytes(), 0),
-            None => (
-                traffic.velocities.bytes,
-                traffic.collisions.bytes,
-                traffic.poses.bytes + traffic.results.bytes,
-            ),
-        };
-        let load = part(cycles.load, first, PartLimit::Streams);
-        let pass = part(cycles.pass, each, interval_limit(variant));
-        let integration = part(cycles.integration(), last, PartLimit::Streams);
+        let (first, each) = (traffic.velocities.bytes, traffic.collisions.bytes);
+        let last = traffic.poses.bytes + traffic.results.bytes;
+        let load = part(cycles.load, first);
+        let pass = part(cycles.pass, each);
+        let integration = part(cycles.integration(), last);
         let fill_seconds = (cycles.fill + cycles.integration_fill) as f64 / clock_hz;
-        let passes = traffic.collision_streams as f64 * pass.seconds;
+        let passes = traffic.passes as f64 * pass.seconds;
         let seconds = load.seconds + passes + fill_seconds + integration.seconds;
         Self { load, pass, integration, seconds, bytes: traffic.bytes() }
     }
-
-    /// The step in clock cycles of the accelerator, waits for the memory included.
-    #[must_use]
-    pub fn cycles(&self, variant: &Variant) -> f64 {
-        self.seconds * f64::from(variant.profile.clock_khz) * 1e3
-    }
-}
-
-/// The limit that keeps the initiation interval from being shorter; the pipeline's ports if streams
-/// and ports allow the same interval.
-fn interval_limit(variant: &Variant) -> PartLimit {
-    let account = PortAccount::new(variant);
-    if account.by_streams > account.by_ports() { PartLimit::Streams } else { PartLimit::Pipeline }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::{MIXED, thesis};
-    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
+    use crate::estimate::thesis;
+    use pgs_interface::profile::{FLOAT, HALF, Profile};
 
     const THESIS_STEP: StepShape = thesis::step();
 
@@ -128,26 +77,16 @@ mod tests {
         StepTime::new(&profile.default_variant(), Records::Streamed, &THESIS_STEP, bandwidth)
     }
 
-    fn limits(time: &StepTime) -> [PartLimit; 3] {
-        [time.load.limit, time.pass.limit, time.integration.limit]
-    }
-
     /// The times of the platform notes: eight passes of 127,000 collisions.
     #[test]
     fn the_sustained_bandwidth_limits_float_and_the_peak_does_not() {
-        let passes = |profile, bandwidth| {
-            let time = time(profile, bandwidth);
-            (time.pass.seconds * 8e3, time.pass.limit)
-        };
-        for (profile, bandwidth, ms, limit) in [
-            (&FLOAT, Bandwidth::ZCU102_SUSTAINED, 8.89, PartLimit::Memory),
-            (&FLOAT, Bandwidth::ZCU102_PEAK, 7.39, PartLimit::Pipeline),
-            (&HALF, Bandwidth::ZCU102_SUSTAINED, 6.10, PartLimit::Pipeline),
-            (&MIXED, Bandwidth::ZCU102_SUSTAINED, 4.064, PartLimit::Pipeline),
+        for (profile, bandwidth, ms) in [
+            (&FLOAT, Bandwidth::ZCU102_SUSTAINED, 8.89),
+            (&FLOAT, Bandwidth::ZCU102_PEAK, 7.39),
+            (&HALF, Bandwidth::ZCU102_SUSTAINED, 6.10),
         ] {
-            let (found, by) = passes(profile, bandwidth);
+            let found = time(profile, bandwidth).pass.seconds * 8e3;
             assert!((found - ms).abs() < 0.005, "{} {found} ms, not {ms}", profile.name);
-            assert_eq!(by, limit, "{}", profile.name);
         }
     }
 
@@ -160,29 +99,12 @@ mod tests {
     }
 
     #[test]
-    fn each_part_says_what_limits_it() {
-        use PartLimit::{Memory, Pipeline, Streams};
-        assert_eq!(limits(&time(&MIXED, Bandwidth::Unlimited)), [Streams, Pipeline, Streams]);
-        assert_eq!(limits(&time(&MIXED, Bandwidth::ZCU102_PEAK)), [Streams, Pipeline, Memory]);
-        assert_eq!(limits(&time(&FLOAT, Bandwidth::ZCU102_SUSTAINED)), [Memory; 3]);
-        assert_eq!(limits(&time(&NAIVE, Bandwidth::ZCU102_SUSTAINED)), [Streams; 3]);
-    }
-
-    #[test]
     fn a_step_is_the_sum_of_its_parts() {
-        let time = time(&MIXED, Bandwidth::ZCU102_SUSTAINED);
-        // Velocities 77,760 beats, passes of 381,000, poses 77,760, results 155,520.
-        assert_eq!(time.bytes, 16 * (77_760 + 8 * 381_000 + 77_760 + 155_520));
+        let time = time(&HALF, Bandwidth::ZCU102_SUSTAINED);
+        // Velocities 38,880 beats, passes of 444,500, poses 38,880, results 77,760.
+        assert_eq!(time.bytes, 16 * (38_880 + 8 * 444_500 + 38_880 + 77_760));
         let expected =
-            25_920.0 / 250e6 + 8.0 * 127_000.0 / 250e6 + 2_944.0 / 250e6 + 3_732_480.0 / 12.8e9;
+            15_552.0 / 250e6 + 8.0 * 190_500.0 / 250e6 + 2_205.0 / 250e6 + 1_866_240.0 / 12.8e9;
         assert!((time.seconds - expected).abs() < 1e-12, "{} s", time.seconds);
-        assert!((time.cycles(&MIXED.default_variant()) - expected * 250e6).abs() < 1e-3);
-    }
-
-    #[test]
-    fn mixed_moves_less_than_half_of_floats_bytes() {
-        let bytes = |profile| time(profile, Bandwidth::Unlimited).bytes;
-        assert_eq!((bytes(&FLOAT), bytes(&MIXED)), (118_768_640, 53_744_640));
-        assert!(2 * bytes(&MIXED) <= bytes(&FLOAT));
     }
 }

@@ -4,19 +4,16 @@
 //! run side by side, and each takes `128 / width` cycles for a beat of 128 bits. The array takes
 //! the cycles of its busiest stream.
 
-use super::designs::{self, Window};
 use super::step::StepShape;
 use pgs_interface::number::StreamFormat;
-use pgs_interface::profile::{Inertia, Profile, RecordWords, THESIS_WORDS, Variant};
-use pgs_interface::record::{LANES, pose, result};
+use pgs_interface::profile::{Inertia, RecordWords, THESIS_WORDS, Variant};
+use pgs_interface::record::{LANES, collision, pose, result};
 use pgs_interface::stripe::Stripe;
 
 /// Bits of a beat.
 const BEAT_BITS: u64 = 128;
 const BITS_PER_BYTE: u64 = 8;
 
-/// Numbers of a relative collision: normal 3, four points with distance 16, offset 3, indices 2.
-pub(crate) const RELATIVE_NUMBERS: u32 = 24;
 /// Numbers of a world inverse inertia.
 const INERTIA_NUMBERS: u32 = 6;
 
@@ -101,9 +98,7 @@ fn packed_numbers(variant: &Variant) -> RecordWords {
         Inertia::Isotropic => 0,
         Inertia::World => INERTIA_NUMBERS,
     };
-    let relative = designs::is_relative(variant.profile);
-    let collision = if relative { RELATIVE_NUMBERS } else { THESIS_WORDS.collision };
-    RecordWords { velocity: THESIS_WORDS.velocity + inertia, collision, ..THESIS_WORDS }
+    RecordWords { velocity: THESIS_WORDS.velocity + inertia, ..THESIS_WORDS }
 }
 
 /// Traffic of one step.
@@ -113,8 +108,8 @@ pub struct StepTraffic {
     pub velocities: Transfer,
     /// Collisions in, once.
     pub collisions: Transfer,
-    /// Number of times that the collisions stream in a step.
-    pub collision_streams: u64,
+    /// Passes: the collisions stream once in each.
+    pub passes: u64,
     /// Poses in.
     pub poses: Transfer,
     /// Results out, while the poses come in.
@@ -133,15 +128,14 @@ impl StepTraffic {
         };
         let body = |size, format, stripe, to| array(step.bodies, 1, size, format, stripe, to);
         let numbers = packed_numbers(variant);
-        let collision = (numbers.collision, designs::collision_rows(profile));
+        let record = (numbers.collision, collision::ROWS);
         let (each, whole) = (step.collisions, profile.collisions_per_issue);
         let velocity = (numbers.velocity, variant.velocity_rows());
         let (pose, result) = ((numbers.pose, pose::ROWS), (numbers.result, result::ROWS));
-        let once = Window::of(profile).is_some();
         Self {
             velocities: body(velocity, formats.bodies, &stripes.velocities, to),
-            collisions: array(each, whole, collision, formats.collisions, &stripes.collisions, to),
-            collision_streams: if once { step.passes().min(1) } else { step.passes() },
+            collisions: array(each, whole, record, formats.collisions, &stripes.collisions, to),
+            passes: step.passes(),
             poses: body(pose, formats.poses, &stripes.poses, to),
             results: body(result, formats.poses, &stripes.results, from),
         }
@@ -151,55 +145,14 @@ impl StepTraffic {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let bodies = self.velocities.bytes + self.poses.bytes + self.results.bytes;
-        self.collisions.bytes * self.collision_streams + bodies
-    }
-}
-
-/// High-performance ports between memory and logic: HP0 to HP3 (UG1085; the two HPC ports cost
-/// more).
-pub const HP_PORTS: usize = 4;
-/// Width of an HP port, bits.
-pub const HP_PORT_BITS: u32 = 128;
-
-/// Issues for each streamed entry, with four passes of each kind.
-pub(crate) fn issues_of_an_entry(profile: &Profile) -> u64 {
-    Window::of(profile).map_or(1, |design| design.issues_per_entry(&StepShape::new(0, 0)))
-}
-
-/// Demand of a profile's collision streams on the memory while a pass runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StreamDemand {
-    /// Streams to the accelerator; each takes a port of its own.
-    pub ports: usize,
-    /// Whether every stream gets a port, and none is wider than its port.
-    pub fits: bool,
-    /// Bytes per second.
-    pub rate: f64,
-}
-
-impl StreamDemand {
-    /// The demand of a variant of a profile.
-    #[must_use]
-    pub fn new(variant: &Variant) -> Self {
-        let profile = variant.profile;
-        let step = StepShape::new(0, u64::from(profile.collisions_per_issue));
-        let issue = StepTraffic::new(variant, Records::Streamed, &step).collisions;
-        let clock = f64::from(profile.clock_khz) * 1e3;
-        let ports = profile.mm2s_widths.len();
-        let cycles = u64::from(profile.initiation_interval) * issues_of_an_entry(profile);
-        Self {
-            ports,
-            fits: ports <= HP_PORTS && profile.mm2s_widths.iter().all(|w| *w <= HP_PORT_BITS),
-            rate: issue.bytes as f64 / cycles as f64 * clock,
-        }
+        self.collisions.bytes * self.passes + bodies
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::{DESIGNS, MIXED};
-    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, PROFILES};
 
     fn streamed(variant: &Variant, bodies: u64, collisions: u64) -> StepTraffic {
         StepTraffic::new(variant, Records::Streamed, &StepShape::new(bodies, collisions))
@@ -214,10 +167,6 @@ mod tests {
         assert_eq!(float.velocities.padding, 0);
         // Naive: 28 words on 32 bits.
         assert_eq!(streamed(&NAIVE.default_variant(), 0, 5).collisions.cycles, 5 * 28);
-        // Mixed: three beats on three streams.
-        let mixed = streamed(&MIXED.default_variant(), 3, 5);
-        assert_eq!((mixed.collisions.cycles, mixed.collisions.bytes), (5, 5 * 48));
-        assert_eq!((mixed.velocities.cycles, mixed.results.cycles), (2, 4));
     }
 
     #[test]
@@ -245,23 +194,8 @@ mod tests {
     }
 
     #[test]
-    fn the_streams_ask_for_the_gb_s_of_the_platform_notes() {
-        let rate = |profile: &'static pgs_interface::profile::Profile| {
-            StreamDemand::new(&profile.default_variant()).rate / 1e9
-        };
-        for (found, expected) in [
-            (rate(&NAIVE), 1.1),
-            (rate(&FLOAT), 15.4),
-            (rate(&HALF), 28.0 / 3.0),
-            (rate(&MIXED), 12.0),
-        ] {
-            assert!((found - expected).abs() < 1e-9, "{found} GB/s, expected {expected}");
-        }
-    }
-
-    #[test]
     fn the_most_bodies_and_collisions_of_the_command_line_are_counted() {
-        for profile in DESIGNS {
+        for profile in PROFILES {
             for records in Records::ALL {
                 let step = StepShape::new(u32::MAX.into(), u32::MAX.into());
                 let traffic = StepTraffic::new(&profile.default_variant(), records, &step);

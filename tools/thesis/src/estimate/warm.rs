@@ -1,11 +1,10 @@
 //! The cost of a warm start: a pass more of each kind, and impulses in and out.
 
 use super::cycles::StepCycles;
-use super::designs;
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic, Transfer};
 use pgs_interface::profile::Variant;
-use pgs_interface::record::BEAT_BYTES;
+use pgs_interface::record::{BEAT_BYTES, collision};
 
 /// The way in which a step applies the impulses that it begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,8 +40,7 @@ impl WarmCost {
         let stripe = profile.stripes.warm_collisions?;
         let records = |count| {
             let format = variant.numbers.collisions;
-            let (together, rows) =
-                (profile.collisions_per_issue, designs::warm_collision_rows(profile));
+            let (together, rows) = (profile.collisions_per_issue, collision::WARM_ROWS);
             Transfer::streamed(count, together, rows, format, &stripe, profile.mm2s_widths)
         };
         let together = u64::from(profile.collisions_per_issue);
@@ -76,7 +74,6 @@ impl WarmCost {
 mod tests {
     use super::*;
     use crate::estimate::thesis;
-    use crate::estimate::{MIXED, WINDOWED};
     use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     const THESIS_STEP: StepShape = thesis::step();
@@ -104,8 +101,7 @@ mod tests {
         assert_eq!(first.expect("a warm start").more_cycles, 2 * 4 * 127_000);
     }
 
-    /// Two collisions of `half` are eight beats, two of them on 64 bits; one of `mixed` is four,
-    /// two of them on one stream.
+    /// Two collisions of `half` are eight beats, two of them on 64 bits.
     #[test]
     fn impulses_in_sixteen_bits_come_in_a_beat_of_each_issue() {
         let of = |profile: &'static Profile, way| {
@@ -118,17 +114,13 @@ mod tests {
         // The last slot of a pass is none that stays empty.
         assert_eq!(of(&HALF, own), (2 * (4 * 63_500 - 2) + 285 + 222, 2 * 8 * 16 * 63_500));
         assert_eq!(of(&HALF, first), (2 * (63_500 - 2), 2 * 16 * 63_500));
-        assert_eq!(of(&MIXED, own), (2 * 2 * 127_000 + 364 + 306, 2 * 4 * 16 * 127_000));
-        assert_eq!(of(&MIXED, first), (2 * 127_000, 2 * 16 * 127_000));
     }
 
     #[test]
-    fn a_step_without_passes_has_no_cost_and_some_designs_have_no_warm_start() {
+    fn a_step_without_passes_has_no_cost() {
         let none = StepShape::new(9, 0);
         let cost = WarmCost::new(&FLOAT.default_variant(), WarmStart::OwnPass, &none);
         let cost = cost.expect("a warm start");
         assert_eq!((cost.more_cycles, cost.more_in, cost.more_out), (0, 0, 0));
-        let windowed = WINDOWED.default_variant();
-        assert_eq!(WarmCost::new(&windowed, WarmStart::OwnPass, &THESIS_STEP), None);
     }
 }

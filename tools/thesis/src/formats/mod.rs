@@ -10,7 +10,6 @@ use clap::Args;
 use pgs_command::board;
 use pgs_command::failure::Result;
 use pgs_command::numbers::grouped;
-use pgs_command::options::build::BuildArgs;
 use pgs_command::options::scenes::SceneArgs;
 use pgs_command::options::solver::DeadlineArgs;
 use serde_json::json;
@@ -33,7 +32,7 @@ Examples:
 The numbers are the ones that a step streams to the board, without unused contact points, indices
 and counts. The sum \"as streamed\" has the positions of both bodies with every collision, the sum
 \"each once\" has the position of each body once. Relative numbers have the position of body A
-subtracted, as the profile mixed streams them; a static body counts as being at the other body's
+subtracted; a static body counts as being at the other body's
 position. Neither sum includes the relative numbers.
 
 Relative errors are |read back - number| / |number|. A zero has no relative error, and does not
@@ -54,7 +53,7 @@ pub(crate) static FORMATS: Experiment = Experiment {
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FormatsArgs {
     /// Take the step from this folder of .npy arrays instead of a scene.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "BuildArgs", "step"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["SceneArgs", "step"])]
     input: Option<PathBuf>,
     /// Step of the scene whose numbers are measured; the steps before it are taken first.
     #[arg(
@@ -68,8 +67,6 @@ pub(crate) struct FormatsArgs {
     scene: SceneArgs,
     #[command(flatten)]
     deadline: DeadlineArgs,
-    #[command(flatten)]
-    build: BuildArgs,
 }
 
 /// Measures the numbers.
@@ -112,11 +109,11 @@ fn measure(args: &FormatsArgs, session: &Session) -> Result<Part> {
 
 /// The scene before its measured step; none if Ctrl-C ended the run before it.
 fn stepped(args: &FormatsArgs, session: &Session) -> Result<Option<GivenStep>> {
-    let build = args.build.build();
-    let mut opened = board::open_as(&session.common, &build, args.scene.config(&build))?.stated();
+    let build = session.common.build();
+    let mut opened = board::open(&session.common, args.scene.config(&build))?.stated();
     args.scene.check_size(opened.accelerator.capabilities())?;
     let scene = args.scene.build(&build)?;
-    let parameters = args.deadline.apply(StepParameters::default());
+    let parameters = args.deadline.apply(StepParameters::thesis());
     let before = args.step.saturating_sub(1);
     let step = GivenStep::after(before, scene, &mut opened, parameters, session);
     session.end();

@@ -7,12 +7,12 @@ use crate::estimate::thesis::amdahl;
 use crate::estimate::thesis::recorded::{
     ACCELERATED_SHARE, CPU, Design, GPU, Platform, ZCU102_WATTS,
 };
-use crate::estimate::{DESIGNS as ALL, Records, StepTime, thesis};
+use crate::estimate::{Records, StepTime, thesis};
 use crate::experiment::Part;
 use crate::figure::{Figure as Chart, bars};
 use crate::index::Row;
 use bitstream_model::Bandwidth;
-use pgs_interface::profile::Variant;
+use pgs_interface::profile::{PROFILES, Variant};
 
 use super::scene::{Scene, difference};
 use crate::table::{Cell, Kind, Table, text};
@@ -230,8 +230,7 @@ pub(super) fn figures(part: &mut Part) {
         model's, on the thesis' step. The thesis' figure has bars of its first design, and its \
         text prints no numbers of it. Our naive converts contacts within the passes, the thesis in \
         a kernel of its own whose rows go through memory: ours is a lower bound of its first \
-        design. mixed, windowed and windowed16 are this project's own, and no boards: no hardware \
-        has them, and no processor of this class can order collisions for the last two.";
+        design.";
     let (figure, row) = over_both(
         ("figure-6-1", "§6.5, Figure 6.1"),
         ["speed-up", "Speed-up of each design over GPU and CPU", caption],
@@ -262,7 +261,7 @@ fn over_both(
     let names = ["GPU, recorded", "GPU, modelled", "CPU, recorded", "CPU, modelled"];
     let (mut groups, mut values) = (Vec::new(), Vec::new());
     let [mut printed, mut modelled] = [Vec::new(), Vec::new()];
-    for profile in ALL {
+    for profile in PROFILES {
         let variant = profile.default_variant();
         let time = StepTime::new(&variant, Records::Packed, &thesis::step(), Bandwidth::Unlimited);
         let [gpu, cpu] = [&GPU, &CPU].map(|platform| ours(time.seconds * 1e3, platform));

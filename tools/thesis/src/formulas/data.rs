@@ -1,7 +1,7 @@
 //! Tables 4.1 to 4.6: words in and out, before and after each reduction.
 
 use crate::estimate::thesis::data::{DataTable, TABLES};
-use crate::estimate::{Records, StepTraffic, words};
+use crate::estimate::{Records, StepTraffic};
 
 use super::scene::{Scene, mib, printed_mib, whole};
 use crate::table::{Cell, Kind, Table, text};
@@ -63,7 +63,7 @@ fn streamed(scene: &Scene) -> Table {
         "The same as streamed, collisions once: 32-bit words with padding, beside T4.5 and T4.6";
     let (input, output) = (TABLES[4].rows[1].total, TABLES[5].rows[1].total);
     scene.table("records", title, Kind::Exact, |variant| {
-        let each = words(variant);
+        let each = variant.words();
         let traffic = StepTraffic::new(variant, Records::Streamed, &scene.step);
         let arrays = [traffic.velocities, traffic.collisions, traffic.poses];
         let ours = arrays.iter().map(|array| array.bytes).sum::<u64>() / 4;

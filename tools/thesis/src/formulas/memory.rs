@@ -1,8 +1,7 @@
-//! The tables of on-chip memory, logic and streams.
+//! The tables of on-chip memory and logic.
 
 use crate::estimate::thesis::recorded::Design;
-use crate::estimate::{BLOCKS, HP_PORTS, MemoryUse, ShapedBlocks, StreamDemand};
-use bitstream_model::Bandwidth;
+use crate::estimate::{BLOCKS, MemoryUse, ShapedBlocks};
 use pgs_interface::profile::Variant;
 
 use super::scene::{Scene, mib, printed_mib, whole, yes_or_no};
@@ -115,30 +114,4 @@ fn logic(scene: &Scene) -> Table {
         ]);
     }
     table
-}
-
-/// Stream widths against the ports, and required bandwidth against the memory's.
-pub(super) fn streams(scene: &Scene) -> Vec<Table> {
-    let title = "Streams against ports and memory while a pass runs";
-    let mut table = scene.table("streams", title, Kind::Modelled, |variant| {
-        let demand = StreamDemand::new(variant);
-        let share = |bandwidth| match bandwidth {
-            Bandwidth::Unlimited => Cell::Missing,
-            Bandwidth::BytesPerSecond(rate) => Cell::Share(demand.rate / rate as f64 * 100.0),
-        };
-        let widths: Vec<_> = variant.profile.mm2s_widths.iter().map(u32::to_string).collect();
-        [[
-            ("widths", "widths, bits", text(widths.join(" + "))),
-            ("ports", "HP ports of 4", whole(demand.ports as u64)),
-            ("within", "within the ports", yes_or_no(demand.fits)),
-            ("gb_per_second", "GB/s", Cell::Number(demand.rate / 1e9, 2)),
-            ("of_peak_percent", "of 17.07", share(Bandwidth::ZCU102_PEAK)),
-            ("of_sustained_percent", "of 12.8", share(Bandwidth::ZCU102_SUSTAINED)),
-        ]]
-    });
-    table.note(format!(
-        "Each stream takes one of the {HP_PORTS} high-performance ports of 128 bits (UG1085). HP1 \
-         and HP2 share a port of the memory controller. Above 100 % a pass waits for the memory.",
-    ));
-    vec![table]
 }

@@ -1,28 +1,23 @@
 //! The cost of a step by formula, beside every table of the thesis, without running anything.
 
 mod comparison;
+mod cycles;
 mod data;
 mod euler;
 mod memory;
-mod mixed;
-mod ports;
 mod rows;
 mod scene;
-mod step;
 mod warm;
-mod windowed;
 
-use bitstream_model::Bandwidth;
 use clap::builder::PossibleValuesParser;
 use clap::{ArgMatches, Args, Command};
-use pgs_command::failure::{Failure, Result};
+use pgs_command::failure::Result;
 use pgs_command::numbers::grouped;
-use pgs_command::options::build::number;
-use pgs_interface::profile::{Inertia, Profile, Variant};
+use pgs_interface::profile::{PROFILES, Profile};
 use serde_json::json;
 
 use self::scene::Scene;
-use crate::estimate::{DESIGNS, StepShape, thesis};
+use crate::estimate::{StepShape, thesis};
 use crate::experiment::{Boards, Experiment, Part, given};
 use crate::session::Session;
 use crate::table::Table;
@@ -34,7 +29,7 @@ longer), recorded (a figure of the thesis) or open (unknown). No figure was meas
 /// The name of all designs on the command line.
 const ALL: &str = "all";
 
-/// The step, the designs and the bandwidths of the formulas.
+/// The step and the designs of the formulas.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct StepArgs {
@@ -47,38 +42,25 @@ pub(crate) struct StepArgs {
     /// Design whose rows are shown
     #[arg(long, value_name = "NAME", default_value = ALL, value_parser = names())]
     profile: String,
-    /// Take the designs with the world inertia of every body, streamed and kept on chip
-    #[arg(long)]
-    world_inertia: bool,
-    /// Memory bandwidth of the table of times in GB/s, or "unlimited" [default: unlimited, 17.07,
-    /// 16 and 12.8 in turn]
-    #[arg(long, value_name = "GBPS", value_parser = number("bandwidth", |build| build.bandwidth))]
-    bandwidth: Option<Bandwidth>,
 }
 
 fn names() -> PossibleValuesParser {
-    DESIGNS.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
+    PROFILES.iter().map(|profile| profile.name).chain([ALL]).collect::<Vec<_>>().into()
 }
-
-const BANDWIDTHS: [Bandwidth; 4] = [
-    Bandwidth::Unlimited,
-    Bandwidth::ZCU102_PEAK,
-    thesis::recorded::MEMORY_BANDWIDTH,
-    Bandwidth::ZCU102_SUSTAINED,
-];
 
 impl StepArgs {
     fn scene(&self) -> Scene {
         let bodies = self.bodies.map_or(thesis::BODIES, u64::from);
         let collisions = self.collisions.map_or(thesis::COLLISIONS, u64::from);
-        let inertia = if self.world_inertia { Inertia::World } else { Inertia::Isotropic };
         let asked =
             |profile: &&&'static Profile| self.profile == ALL || self.profile == profile.name;
-        let variant = |profile: &&'static Profile| Variant { inertia, ..profile.default_variant() };
         Scene {
             step: StepShape::new(bodies, collisions),
-            variants: DESIGNS.iter().filter(asked).map(variant).collect(),
-            bandwidths: self.bandwidth.map_or_else(|| BANDWIDTHS.to_vec(), |one| vec![one]),
+            variants: PROFILES
+                .iter()
+                .filter(asked)
+                .map(|profile| profile.default_variant())
+                .collect(),
         }
     }
 
@@ -86,12 +68,8 @@ impl StepArgs {
     fn part(&self, tables: Tables) -> Result<Part> {
         let scene = self.scene();
         let tables = tables(&scene);
-        if tables.is_empty() {
-            let error = format!("there is nothing about {} here", self.profile);
-            return Err(Failure::input(error).next("ask for another --profile, or for all"));
-        }
         // The thesis has its own step and its own designs alone.
-        let of_thesis = scene.is_thesis_step() && self.profile == ALL && !self.world_inertia;
+        let of_thesis = scene.is_thesis_step() && self.profile == ALL;
         let rows = if of_thesis { rows::of(&tables) } else { Vec::new() };
         let mut part = Part { rows, ..Part::of(tables) };
         part.fact("step", self.head(&scene));
@@ -102,7 +80,6 @@ impl StepArgs {
             "contact_iterations": step.contact_iterations,
             "friction_iterations": step.friction_iterations,
             "thesis_step": scene.is_thesis_step(),
-            "world_inertia": self.world_inertia,
         });
         Ok(part)
     }
@@ -126,9 +103,6 @@ impl StepArgs {
                 grouped(thesis::COLLISIONS),
             );
         }
-        if self.world_inertia {
-            text += " With the world inertia of every body, which the thesis does not have.";
-        }
         text
     }
 }
@@ -150,15 +124,9 @@ const fn formula(
     Experiment { id, thesis, about, boards, arguments, run }
 }
 
-const STEP: [&str; 3] =
-    ["step", "Tables 6.4 and 6.8", "Cycles and time of a step, and what world inertia costs"];
-const MIXED: [&str; 3] = ["mixed", "§7.3", "A design of ours, mixed, against float"];
-const WINDOWED: [&str; 3] =
-    ["windowed", "§4.7, §7.3", "Two designs that stream the collisions once, against float"];
+const CYCLES: [&str; 3] = ["cycles", "Tables 6.4 and 6.8", "Cycles and time of a step"];
 const DATA: [&str; 3] = ["data", "§4.4.1, Tables 4.1 to 4.6", "Words in and out"];
 const MEMORY: [&str; 3] = ["memory", "§4.4.2, Tables 6.4 and 6.8", "On-chip memory and logic"];
-const STREAMS: [&str; 3] = ["streams", "§5.4.2", "Stream widths and memory bandwidth"];
-const PORTS: [&str; 3] = ["ports", "§5.4.3, §5.5", "Block RAM ports and the initiation interval"];
 const WARM: [&str; 3] = ["warm", "§2.2.3", "The cost of a warm start"];
 const COMPARISON: [&str; 3] = [
     "comparison",
@@ -168,14 +136,10 @@ const COMPARISON: [&str; 3] = [
 const EULER: [&str; 3] = ["euler", "§2.1.3, Figure 2.6", "Explicit integration of a fall"];
 
 /// All of them.
-pub(crate) static FORMULAS: [Experiment; 10] = [
-    formula(STEP, |args, _| part(args, step::tables)),
-    formula(MIXED, |args, _| part(args, mixed::tables)),
-    formula(WINDOWED, |args, _| part(args, windowed::tables)),
+pub(crate) static FORMULAS: [Experiment; 6] = [
+    formula(CYCLES, |args, _| part(args, cycles::tables)),
     formula(DATA, |args, _| part(args, data::tables)),
     formula(MEMORY, |args, _| part(args, memory::tables)),
-    formula(STREAMS, |args, _| part(args, memory::streams)),
-    formula(PORTS, |args, _| part(args, ports::tables)),
     formula(WARM, |args, _| part(args, warm::tables)),
     formula(COMPARISON, |args, _| {
         let mut part = part(args, comparison::tables)?;

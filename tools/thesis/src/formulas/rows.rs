@@ -2,7 +2,6 @@
 
 use crate::estimate::thesis::recorded::{CPU, DESIGNS, DEVICE_MEGABYTES, Design, GPU, Platform};
 use crate::estimate::{BLOCK_BITS, BLOCKS};
-use pgs_interface::profile::FLOAT;
 
 use crate::index::{Origin, Row};
 use crate::table::{Cell, Table, anchor};
@@ -41,10 +40,9 @@ const DATA: &[Figure] = &[
 ];
 const POSITIONS: Figure = ("thesis_with_positions_mib", "with_positions_mib", " MiB");
 const ENERGY: &str = "§6.4, §6.5, Tables 6.5 and 6.9: energy of GPU and CPU, J";
-const BANDWIDTH: &[&str] = &["profile", "records", "bandwidth"];
 
 /// The tables that have figures of the thesis.
-const SOURCES: [Source; 13] = [
+const SOURCES: [Source; 12] = [
     source("T4.1", "§4.4.1, Table 4.1", &[], DATA),
     source("T4.2", "§4.4.1, Table 4.2", &[], DATA),
     source("T4.3", "§4.4.1, Table 4.3", &[], DATA),
@@ -60,7 +58,6 @@ const SOURCES: [Source; 13] = [
         &["profile"],
         &[("thesis_percent", "ideal_percent", "")],
     ),
-    source("time", "{latency}: ms", BANDWIDTH, &[("thesis_ms", "ms", "")]),
     source("platforms", ENERGY, &["platform"], &[("joules", "recomputed_joules", "")]),
     source("comparison", "{table}", &["profile", "figure"], &[("thesis", "packed_unlimited", "")]),
 ];
@@ -137,21 +134,14 @@ fn powers() -> Row {
 /// Logic and clock of a design (Tables 6.4 and 6.8), which no synthesis has given for ours.
 fn logic(design: &Design) -> Row {
     let Design { dsp, flip_flops, lookup_tables, clock_mhz, .. } = design;
-    // The Verilog is of this profile.
-    let (counted, command) = match design.profile.id == FLOAT.id {
-        true => (
-            "Yosys counts the cells of its generated Verilog (the command)",
-            "tools/scripts/rtl-resources.sh",
-        ),
-        false => ("it has no Verilog", ""),
-    };
-    let ours = format!("not synthesised by Vivado; {counted}; the clock is taken from the thesis");
+    let ours = "not synthesised by Vivado; Yosys counts the cells of its generated Verilog (the \
+                command); the clock is taken from the thesis";
     row(
         of_design(design, design.results, ": logic and clock"),
         format!("{}: DSP48E, FF, LUT, clock", design.profile.name),
-        [format!("{dsp} %, {flip_flops} %, {lookup_tables} %, {clock_mhz} MHz"), ours],
+        [format!("{dsp} %, {flip_flops} %, {lookup_tables} %, {clock_mhz} MHz"), ours.to_owned()],
         Origin::Open,
-        command,
+        "tools/scripts/rtl-resources.sh",
         anchor("logic"),
     )
 }
@@ -208,7 +198,6 @@ impl Source {
         let design = DESIGNS.into_iter().find(|design| design.profile.name == name)?;
         let table = match table {
             "{results" => design.results.to_owned(),
-            "{latency" => design.comparison.to_owned(),
             _ => cell("table")?,
         };
         Some(of_design(design, &table, what))

@@ -1,7 +1,6 @@
-//! The input of the model: a step, profiles, bandwidths.
+//! The input of the model: a step and profiles.
 
 use crate::estimate::{StepShape, thesis};
-use bitstream_model::Bandwidth;
 use pgs_interface::profile::Variant;
 
 use crate::table::{Cell, Kind, Table, text};
@@ -11,7 +10,6 @@ use crate::table::{Cell, Kind, Table, text};
 pub(crate) struct Scene {
     pub(super) step: StepShape,
     pub(super) variants: Vec<Variant>,
-    pub(super) bandwidths: Vec<Bandwidth>,
 }
 
 impl Scene {

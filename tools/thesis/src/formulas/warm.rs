@@ -5,7 +5,7 @@ use crate::estimate::{WarmCost, WarmStart};
 use super::scene::{Scene, whole};
 use crate::table::{Cell, Kind, Table, text};
 
-/// The table, if one of the profiles has a warm start.
+/// The table.
 pub(super) fn tables(scene: &Scene) -> Vec<Table> {
     let title = "Warm start: impulses in and out";
     let mut table = scene.table("warm", title, Kind::Modelled, |variant| {
@@ -32,5 +32,5 @@ pub(super) fn tables(scene: &Scene) -> Vec<Table> {
          do not hold a pile: a row is solved before its neighbours' impulses are in, and takes its \
          own back.",
     );
-    if table.rows.is_empty() { Vec::new() } else { vec![table] }
+    vec![table]
 }

@@ -9,7 +9,6 @@ use std::time::Instant;
 use clap::Args;
 use scene::{Grid, SplitMix64};
 use zynq_pgs::StepParameters;
-use zynq_pgs::emulation::Build;
 use zynq_pgs::order::{
     InputBuffers, IssueWindow, Order, OrderError, OrderInput, Orderer, Schedule,
 };
@@ -163,8 +162,8 @@ impl Measure for OrderArgs {
             None => {
                 let OrderArgs { grid, drop, steps, .. } = *self;
                 let (scene, mut opened) =
-                    pile::open(grid, drop, &session.common, &Build::default())?;
-                let parameters = StepParameters::default();
+                    pile::open(grid, drop, &session.common, session.common.build().config())?;
+                let parameters = StepParameters::thesis();
                 let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
                 (format!("{grid} cubes dropped from {drop} m, step {}", steps + 1), step, None)
             }

@@ -24,15 +24,29 @@ pub(super) fn html(report: &Report) -> String {
         let _ = writeln!(text, "<li>{} {}</li>", tag(origin), escaped(origin.meaning()));
     }
     text.push_str(
-        "</ul>\n<nav><a href=\"#index\">Index</a> <a href=\"#figures\">Figures</a> \
-         <a href=\"#tables\">Tables</a></nav>\n</header>\n<main>\n",
+        "</ul>\n<nav><a href=\"#figures\">Figures</a> <a href=\"#index\">Index</a> \
+         <a href=\"#tables\">Tables</a></nav>\n</header>\n<main>\n<section \
+         class=\"numbers\">\n",
     );
-    index(&mut text, &report.part.rows);
+    for Row { thesis, subject, recorded, ours, origin, shown, .. } in &report.numbers {
+        let _ = writeln!(
+            text,
+            "<a href=\"#{shown}\"><b>{}</b> {} {}<br>thesis, {}: {}</a>",
+            escaped(ours),
+            escaped(subject),
+            tag(*origin),
+            escaped(thesis),
+            escaped(recorded)
+        );
+    }
+    text.push_str("</section>\n");
     text.push_str("<section id=\"figures\">\n<h2>Figures</h2>\n");
     for figure in &report.part.figures {
         self::figure(&mut text, figure);
     }
-    text.push_str("</section>\n<section id=\"tables\">\n<h2>Tables</h2>\n");
+    text.push_str("</section>\n");
+    index(&mut text, &report.part.rows);
+    text.push_str("<section id=\"tables\">\n<h2>Tables</h2>\n");
     for table in &report.part.tables {
         text.push_str(&table.to_html());
     }

@@ -10,8 +10,9 @@ use scene::Grid;
 use super::AllArgs;
 use crate::command::experiments;
 use crate::experiment::{Part, shown};
+use crate::index::Row;
 use crate::session::Session;
-use pgs_command::common::{BoardName, CommonArgs};
+use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::interrupt::Interrupt;
 use pgs_command::options::scenes::DROP;
@@ -30,6 +31,8 @@ pub(super) struct Report {
     /// The step is a folder's.
     pub(super) given: bool,
     pub(super) quick: bool,
+    /// The eight numbers of the headline.
+    pub(super) numbers: Vec<Row>,
     pub(super) part: Part,
 }
 
@@ -40,7 +43,7 @@ pub(super) fn gather(args: &AllArgs, common: &CommonArgs, interrupt: &Interrupt)
         bar.set_style(style);
     }
     bar.enable_steady_tick(TICK);
-    let common = CommonArgs { board: BoardName::Emulated, ..common.clone() };
+    let common = CommonArgs { board: CommonArgs::emulated().board, ..common.clone() };
     let session = Session::within(&common, interrupt.clone(), bar.clone());
     let gathered = of_all(args, &session, &bar);
     bar.finish_and_clear();
@@ -48,7 +51,7 @@ pub(super) fn gather(args: &AllArgs, common: &CommonArgs, interrupt: &Interrupt)
 }
 
 fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report> {
-    let mut part = Part::default();
+    let (mut part, mut numbers) = (Part::default(), Vec::new());
     for (id, words) in args.runs() {
         bar.set_message(id);
         let (command, mut one) = run(id, &words, session)?;
@@ -56,29 +59,25 @@ fn of_all(args: &AllArgs, session: &Session, bar: &ProgressBar) -> Result<Report
             return Err(Failure::new(Cause::Output, "interrupted: no page was written"));
         }
         one.printed_by(&command);
-        // The page has the tables of the formulas; the others stand in its figures.
-        if !FORMULAS.contains(&id) {
+        // The page has the tables of the headline and of the formulas; the others stand in its
+        // figures.
+        if id == HEADLINE && numbers.is_empty() {
+            numbers.clone_from(&one.rows);
+        } else if id != HEADLINE && !FORMULAS.contains(&id) {
             one.tables.clear();
         }
         part.append(one);
     }
     part.sort();
-    Ok(Report { step: args.subject(), given: args.input.is_some(), quick: args.quick, part })
+    let (step, given, quick) = (args.subject(), args.input.is_some(), args.quick);
+    Ok(Report { step, given, quick, numbers, part })
 }
 
+/// The experiment that opens the page.
+const HEADLINE: &str = "step";
+
 /// The formulas, in the order of their tables on the page.
-const FORMULAS: [&str; 10] = [
-    "step",
-    "mixed",
-    "windowed",
-    "data",
-    "memory",
-    "streams",
-    "ports",
-    "warm",
-    "comparison",
-    "euler",
-];
+const FORMULAS: [&str; 6] = ["cycles", "data", "memory", "warm", "comparison", "euler"];
 
 /// Runs an experiment with these options; also the command that repeats it.
 fn run(id: &str, words: &[String], session: &Session) -> Result<(String, Part)> {
@@ -139,7 +138,11 @@ impl AllArgs {
         let (small, steps) = (self.grid([12, 12, 12]), if self.quick { 200 } else { 240 });
         let many = || words(&format!("--grid {small} --drop {LONG_DROP} --steps {steps}"));
         let either = |quick, slow| words(if self.quick { quick } else { slow });
-        let mut runs = vec![
+        let own = self.grid.or_else(|| Grid::new(12, 12, 12).ok().filter(|_| self.quick));
+        let own = own.map_or_else(Vec::new, |grid| words(&format!("--grid {grid}")));
+        let given = self.input.iter().map(|_| (HEADLINE, step(String::new())));
+        let mut runs: Vec<_> = given.chain([(HEADLINE, own)]).collect();
+        runs.extend([
             ("formats", step(format!("--step {}", self.step))),
             (
                 "order",
@@ -155,7 +158,7 @@ impl AllArgs {
             ("half", many()),
             ("stages", Vec::new()),
             ("ladder", Vec::new()),
-        ];
+        ]);
         runs.extend(FORMULAS.map(|id| (id, Vec::new())));
         runs
     }
@@ -172,7 +175,8 @@ fn words(text: &str) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::command::tests::parsed;
-    use crate::index::{Origin, Row, section_key};
+    use crate::experiment::PILES;
+    use crate::index::{Origin, section_key};
     use crate::report::AllArgs;
     use crate::table::Table;
     use clap::{Args as _, Command, FromArgMatches as _};
@@ -245,7 +249,9 @@ mod tests {
             assert!(cells.iter().all(|cell| !cell.is_empty()), "{row:?}");
         }
         let rows = report.part.rows.iter().map(|row| section_key(&row.thesis));
-        let figures = report.part.figures.iter().map(|figure| section_key(figure.thesis));
+        assert_eq!(report.part.figures[0].id, PILES, "the headline's figure is the first");
+        assert_eq!(report.numbers.len(), 8);
+        let figures = report.part.figures[1..].iter().map(|figure| section_key(figure.thesis));
         assert!(rows.clone().is_sorted() && figures.clone().is_sorted());
         assert!(rows.chain(figures).all(|place| !place.is_empty()));
         let ours = |figure: &str| report.part.rows.iter().filter(|row| row.shown == figure).count();

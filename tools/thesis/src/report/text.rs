@@ -56,23 +56,10 @@ pub(super) fn markdown(report: &Report) -> String {
     for origin in Origin::ALL {
         let _ = writeln!(text, "- {} {}: {}", origin.mark(), origin.word(), origin.meaning());
     }
-    text.push_str("\n## Index\n\n| thesis | subject | its figure | ours | | command |\n");
-    text.push_str("| :-- | :-- | :-- | :-- | :-- | :-- |\n");
-    for row in &report.part.rows {
-        let _ = writeln!(
-            text,
-            "| {} | [{}](#{}) | {} | {} | {} {} | `{}` |",
-            row.thesis,
-            row.subject.replace('|', "\\|"),
-            row.shown,
-            row.recorded.replace('|', "\\|"),
-            row.ours.replace('|', "\\|"),
-            row.origin.mark(),
-            row.origin.word(),
-            row.command
-        );
+    text.push_str("\n## Eight numbers\n\n");
+    for Row { thesis, subject, recorded, ours, shown, .. } in &report.numbers {
+        let _ = writeln!(text, "- **{ours}** [{subject}](#{shown}); thesis, {thesis}: {recorded}");
     }
-    let _ = writeln!(text, "\n{}", without_counterpart());
     text.push_str("\n## Figures\n\n");
     for figure in &report.part.figures {
         let _ = writeln!(
@@ -88,6 +75,23 @@ pub(super) fn markdown(report: &Report) -> String {
             figure.caption
         );
     }
+    text.push_str("## Index\n\n| thesis | subject | its figure | ours | | command |\n");
+    text.push_str("| :-- | :-- | :-- | :-- | :-- | :-- |\n");
+    for row in &report.part.rows {
+        let _ = writeln!(
+            text,
+            "| {} | [{}](#{}) | {} | {} | {} {} | `{}` |",
+            row.thesis,
+            row.subject.replace('|', "\\|"),
+            row.shown,
+            row.recorded.replace('|', "\\|"),
+            row.ours.replace('|', "\\|"),
+            row.origin.mark(),
+            row.origin.word(),
+            row.command
+        );
+    }
+    let _ = writeln!(text, "\n{}\n", without_counterpart());
     text.push_str("## Tables\n\n");
     for table in &report.part.tables {
         let _ = write!(text, "<a id=\"{}\"></a>\n{}", table.anchor(), table.to_markdown());

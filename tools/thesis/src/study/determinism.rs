@@ -15,7 +15,6 @@ use crate::permutation::Permutation;
 use crate::session::Session;
 use pgs_command::board::OpenBoard;
 use pgs_command::failure::{Failure, Result};
-use pgs_command::options::build::BuildArgs;
 use pgs_command::options::ordering::is_sequential;
 
 const EXAMPLES: &str = "\
@@ -60,8 +59,6 @@ pub(crate) struct Options {
     /// Seed of the first random order; the others follow
     #[arg(long, value_name = "N", default_value_t = 1)]
     order_seed: u64,
-    #[command(flatten)]
-    build: BuildArgs,
 }
 
 /// Pairs of random orders from a folder, and from a scene.
@@ -117,14 +114,13 @@ impl Measure for Options {
     /// Steps all runs and compares them.
     fn measure(&self, session: &Session) -> Result<Part> {
         let mut start = Start::load(&self.start)?;
-        let build = self.build.build();
-        let config = self.start.scene.config(&build);
-        let mut opened = start.open(&build, config, &session.common, session)?;
+        let config = self.start.scene.config(&session.common.build());
+        let mut opened = start.open(config, &session.common, session)?;
         if !is_sequential(opened.accelerator.capabilities()) {
             let error = "this board does not solve the collisions one after the other in any order: it \
                      reads stale velocities at hazards, or keeps few bodies on chip";
             return Err(Failure::input(error)
-                .next("take a board that waits on hazards, such as --profile float"));
+                .next("take a board that waits on hazards, such as --board emulated"));
         }
         let count = self.pairs.unwrap_or(PAIRS[usize::from(self.start.input.is_none())]);
         let mut gpu = None;

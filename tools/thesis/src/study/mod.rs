@@ -11,6 +11,7 @@ pub(crate) mod split;
 mod spread;
 pub(crate) mod stages;
 pub(crate) mod start;
+pub(crate) mod step;
 pub(crate) mod stopping;
 pub(crate) mod time_step;
 mod words;

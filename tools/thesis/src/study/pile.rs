@@ -1,9 +1,9 @@
 //! Figure 4.1: the pile, as a picture and as a page that plays its fall.
 
+use bitstream_model::BoardConfig;
 use clap::Args;
 use scene::Grid;
 use zynq_pgs::StepParameters;
-use zynq_pgs::emulation::Build;
 use zynq_pgs_view::Recording;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
@@ -47,11 +47,11 @@ impl Measure for Options {
     fn measure(&self, session: &Session) -> Result<Part> {
         let grid = self.grid;
         let (mut scene, mut opened) =
-            pile::open(grid, DROP, &session.emulated(), &Build::default())?;
+            pile::open(grid, DROP, &session.emulated(), BoardConfig::default())?;
         session.watch(&mut opened);
         // As `pgs run`, whose defaults the printed command takes.
         let [steps, _] = STEPS;
-        let parameters = StepParameters::default()
+        let parameters = StepParameters::thesis()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS);
         let mut recording = Recording::new(scene.bodies(), scene.geometries());
@@ -81,7 +81,7 @@ impl Measure for Options {
         let mut figure = Figure::new(
             ("figure-4-1", "§4.3, Figure 4.1"),
             format!("A snapshot of the scene: {cubes} after {steps} steps"),
-            Picture::of_all(scene.bodies(), scene.geometries()).svg().map_err(Failure::input)?,
+            Picture::of(&recording).svg().map_err(Failure::input)?,
             "The thesis shows a snapshot of Bullet's demo with 38,880 cubes.",
         );
         figure.playback = Some(page(&recording, &title, &facts).map_err(Failure::input)?.html);
@@ -90,8 +90,10 @@ impl Measure for Options {
             "38,880 cubes, 90,000 to 130,000 collisions",
             format!("{cubes}, up to {}", counted(most as u64, "collision")),
         );
-        row.command =
-            format!("pgs run --grid {grid} --every {EVERY} --view pile.html --picture pile.png");
+        row.command = format!(
+            "pgs run --grid {grid} --fps {} --view pile.html --picture pile.png",
+            60 / EVERY
+        );
         let mut part = Part::of(Vec::new());
         part.figure(figure, [row]);
         Ok(part)

@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use crate::estimate::thesis::amdahl;
 use crate::estimate::thesis::recorded::{ACCELERATED_SHARE, CPU, DESIGNS, GPU};
+use bitstream_model::BoardConfig;
 use clap::Args;
 use nix::time::{ClockId, clock_gettime};
 use scene::{Grid, Scene};
 use yardstick::Yardstick;
-use zynq_pgs::emulation::Build;
 use zynq_pgs::{StepParameters, StepReport};
 
 use crate::experiment::{Boards, Experiment, Measure, Part};
@@ -104,11 +104,11 @@ impl Measure for Options {
     /// Steps the pile, and times each measured step's search and response.
     fn measure(&self, session: &Session) -> Result<Part> {
         let Options { grid, drop, .. } = *self;
-        let build = Build { threads: Some(1), ..Build::default() };
-        let (mut scene, mut opened) = pile::open(grid, drop, &session.common, &build)?;
+        let config = BoardConfig { threads: 1, ..session.common.build().config() };
+        let (mut scene, mut opened) = pile::open(grid, drop, &session.common, config)?;
         scene.set_threads(1);
         session.watch(&mut opened);
-        let parameters = StepParameters::default();
+        let parameters = StepParameters::thesis();
         session.expect(u64::from(self.steps) + u64::from(self.runs));
         let mut samples = Vec::new();
         let mut goes_on = pile::step_to(&mut scene, &mut opened, &parameters, self.steps, || {

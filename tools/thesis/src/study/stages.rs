@@ -1,10 +1,10 @@
 //! Figures 5.1 and 5.2: a step without a pipeline and with one, on the channels of the board.
 
+use bitstream_model::BoardConfig;
 use pgs_interface::profile::{FLOAT, NAIVE, Profile};
 use scene::{Grid, Scene, SceneOptions};
 use step_trace::TracedStep;
 use zynq_pgs::StepParameters;
-use zynq_pgs::emulation::Build;
 
 use crate::experiment::{Boards, Experiment, Part};
 use crate::figure::Figure;
@@ -34,8 +34,7 @@ const SIDE: u16 = 4;
 fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u64)> {
     let grid = Grid::new(SIDE, SIDE, SIDE).map_err(Failure::input)?;
     let mut scene = Scene::new(&SceneOptions { grid, drop: DROP }).map_err(Failure::input)?;
-    let build = Build { profile: Some(profile), ..Build::default() };
-    let mut opened = board::open(common, &build)?;
+    let mut opened = board::open(common, BoardConfig { profile, ..BoardConfig::default() })?;
     opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
     let observer = opened.observer.clone().ok_or_else(|| {
         Failure::input("the inside of a step can be seen on the emulated board alone")
@@ -48,7 +47,7 @@ fn timeline(profile: &'static Profile, common: &CommonArgs) -> Result<(String, u
         }
         scene.detect();
         let (bodies, collisions) = scene.parts_mut();
-        let stepped = opened.accelerator.step(bodies, collisions, &StepParameters::default());
+        let stepped = opened.accelerator.step(bodies, collisions, &StepParameters::thesis());
         report = Some(stepped.map_err(|error| opened.failure(error))?);
     }
     let recording = observer.take_recording();
@@ -87,11 +86,12 @@ fn measure(common: &CommonArgs) -> Result<Part> {
             format!("{} cycles on the emulated board", grouped(cycles)),
         );
         let StepParameters { contact_iterations, friction_iterations, .. } =
-            StepParameters::default();
+            StepParameters::thesis();
         row.command = format!(
             "pgs run --grid {SIDE}x{SIDE}x{SIDE} --steps {} --contact-iterations \
              {contact_iterations} \
-             --friction-iterations {friction_iterations} --profile {} --json --timeline step.svg",
+             --friction-iterations {friction_iterations} --board emulated:{} --json --timeline \
+             step.svg",
             STEPS + 1,
             profile.name
         );

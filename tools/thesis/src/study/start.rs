@@ -123,7 +123,7 @@ impl<'a> Start<'a> {
             None => {
                 let scene = Box::new(args.scene.build(&Build::default())?);
                 let steps = args.steps.unwrap_or(STEPS);
-                (World::Scene(scene), None, StepParameters::default(), steps)
+                (World::Scene(scene), None, StepParameters::thesis(), steps)
             }
         };
         let parameters = args.deadline.apply(args.solver.apply(own));
@@ -133,12 +133,11 @@ impl<'a> Start<'a> {
     /// Opens a board with the shapes of the start.
     pub(crate) fn open(
         &self,
-        build: &Build,
         config: BoardConfig,
         common: &CommonArgs,
         session: &Session,
     ) -> Result<OpenBoard> {
-        let mut opened = board::open_as(common, build, config)?.stated();
+        let mut opened = board::open(common, config)?.stated();
         match &self.world {
             World::Folder { folder, .. } => {
                 let most = opened.accelerator.capabilities().shapes_max();

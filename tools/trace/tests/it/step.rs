@@ -69,7 +69,7 @@ impl Taken {
             });
         }
         let parameters =
-            StepParameters::default().with_contact_iterations(3).with_friction_iterations(2);
+            StepParameters::thesis().with_contact_iterations(3).with_friction_iterations(2);
         accelerator.step(&mut bodies, &collisions, &parameters).expect("no fault");
         if let Some(fault) = fault {
             board.inject(fault);

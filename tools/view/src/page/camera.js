@@ -6,6 +6,7 @@ const scaled = (a, factor) => a.map(value => value * factor);
 const sum = (a, b) => a.map((value, k) => value + b[k]);
 const unit = a => scaled(a, 1 / Math.hypot(...a));
 
+const LIGHT = [-0.36, 0.8, 0.48]; // Where it comes from.
 const FIELD = 0.7; // Height of the picture, radians.
 
 class Camera {

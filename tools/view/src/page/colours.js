@@ -8,7 +8,6 @@ const THEMES = {
 // Stops from the first to the last value.
 const STOPS = {
 	speed: [[72, 104, 196], [64, 166, 196], [126, 204, 140], [240, 210, 90], [236, 122, 58], [196, 40, 60]],
-	rest: [[240, 168, 70], [198, 178, 130], [130, 164, 168], [78, 120, 170]],
 	start: [[88, 76, 150], [60, 130, 160], [90, 180, 130], [230, 208, 90]],
 };
 
@@ -26,43 +25,44 @@ function ramp(name) {
 	return colours;
 }
 
+const packed = ([red, green, blue]) => red + 256 * green + 65536 * blue;
+
 // What the colours stand for: a colour a body, and the words of the legend.
 class Colouring {
 	constructor(recording) {
 		this.recording = recording;
 		this.colours = new Float32Array(recording.bodies);
-		const heights = recording.numbers[0].subarray(recording.bodies, 2 * recording.bodies);
-		const most = heights.reduce((a, b) => Math.max(a, b), 1);
-		this.start = Uint8Array.from(heights, height => 255 * height / most);
+		const { bodies, kinds } = recording;
+		const { numbers, low, quantum } = recording.frames[0];
+		const heights = Float32Array.from({ length: bodies }, (_, body) => low[1] + quantum * numbers[bodies + body]);
+		const [least, most] = [Math.min, Math.max].map(end => heights.reduce((a, b) => end(a, b), heights[0]));
+		this.start = heights.map(height => 255 * (height - least) / Math.max(most - least, 1e-6));
+		this.kind = Float32Array.from(kinds, kind => packed(recording.head.kinds[kind].colour));
+		this.ramps = Object.fromEntries(Object.keys(STOPS).map(name => {
+			const colours = ramp(name);
+			return [name, Float32Array.from({ length: 256 }, (_, k) => packed(colours.subarray(4 * k, 4 * k + 3)))];
+		}));
 	}
 
 	// The colours at a moment between two frames: red + 256 green + 65536 blue.
 	at(name, { frame, next, fraction }) {
-		const table = this.recording[name];
-		const [before, after] = name === "start" ? [this.start, this.start] : [table[frame], table[next]];
-		const packed = this.packed(name);
+		if (name === "kind") return this.kind;
+		const { frames, speedMost } = this.recording;
+		const [before, after] = [frames[frame].speed, frames[next].speed];
 		const rest = 1 - fraction;
 		for (let body = 0; body < this.colours.length; body++) {
-			this.colours[body] = packed[rest * before[body] + fraction * after[body] + 0.5 | 0];
+			// The root shows slow bodies, too.
+			const value = name === "start" ? this.start[body]
+				: 255 * Math.sqrt((rest * before[body] + fraction * after[body]) / speedMost);
+			this.colours[body] = this.ramps[name][value + 0.5 | 0];
 		}
 		return this.colours;
 	}
 
-	packed(name) {
-		if (this.packedName !== name) {
-			const colours = ramp(name);
-			const one = (_, k) => colours[4 * k] + 256 * colours[4 * k + 1] + 65536 * colours[4 * k + 2];
-			this.packedRamp = Float32Array.from({ length: 256 }, one);
-			this.packedName = name;
-		}
-		return this.packedRamp;
-	}
-
 	legend(name) {
-		const { speedMost } = this.recording.head;
 		return {
-			speed: ["Speed (the scale is a root)", "0 m/s", `${speedMost.toFixed(1)} m/s`],
-			rest: ["Age of rest", "moves", `${this.recording.restMost().toFixed(1)} s and more`],
+			kind: ["Kind"],
+			speed: ["Speed", "0 m/s", `${this.recording.speedMost.toFixed(1)} m/s`],
 			start: ["Height at the start", "lowest", "highest"],
 		}[name];
 	}

@@ -14,70 +14,87 @@ async function inflate(bytes) {
 
 // Whole numbers of a pose: three of the position, three of the quaternion.
 const NUMBERS = 6;
-// Bytes of a body and frame: two of each number, the largest component of the quaternion, the speed.
-const BYTES = 2 * NUMBERS + 2;
+// Bytes of a body and frame: two of each number, the largest component of the quaternion.
+const BYTES = 2 * NUMBERS + 1;
+// A body that is slower is at rest, m/s.
+const SLOWEST = 0.05;
+// Most bytes of all frames of a run that plays while it steps; the oldest frames go.
+const BYTES_MOST = 256 << 20;
 
-// The frames as whole numbers: `numbers[frame][k * bodies + body]`, `largest` and `speed` likewise.
+// The frames as whole numbers: `numbers[k * bodies + body]` of a frame, `largest` and `speed` likewise.
 class Recording {
-	constructor(head, raw) {
+	constructor(head) {
 		this.head = head;
-		this.bodies = head.bodies;
-		this.times = head.times;
-		const expected = this.bodies * (1 + BYTES * this.times.length);
+		this.kinds = Uint8Array.from(head.of);
+		this.bodies = this.kinds.length;
+		this.times = [];
+		this.frames = [];
+		this.speedMost = SLOWEST;
+	}
+
+	// Adds the frames of a page.
+	read(raw) {
+		const { times, low, quantum } = this.head;
+		const expected = this.bodies * BYTES * times.length;
 		if (raw.length !== expected) throw new Error(`it has ${raw.length} bytes of poses in place of ${expected}`);
-		this.kinds = raw.subarray(0, this.bodies);
-		this.numbers = [];
-		this.largest = [];
-		this.speed = [];
-		let at = this.bodies;
+		let at = 0;
 		const plane = () => raw.subarray(at, (at += this.bodies));
-		let last = { numbers: new Uint16Array(NUMBERS * this.bodies), largest: new Uint8Array(this.bodies), speed: new Uint8Array(this.bodies) };
-		for (let frame = 0; frame < this.times.length; frame++) {
+		let last = { numbers: new Uint16Array(NUMBERS * this.bodies), largest: new Uint8Array(this.bodies) };
+		for (const time of times) {
 			const numbers = new Uint16Array(last.numbers.length);
 			for (let k = 0; k < NUMBERS; k++) {
-				const low = plane();
-				const high = plane();
+				const below = plane();
+				const above = plane();
 				const begin = k * this.bodies;
 				for (let body = 0; body < this.bodies; body++) {
-					const coded = low[body] | high[body] << 8;
+					const coded = below[body] | above[body] << 8;
 					numbers[begin + body] = last.numbers[begin + body] + (coded >> 1 ^ -(coded & 1));
 				}
 			}
-			const added = before => {
-				const change = plane();
-				return before.map((value, body) => value + change[body]);
-			};
-			last = { numbers, largest: added(last.largest), speed: added(last.speed) };
-			this.numbers.push(last.numbers);
-			this.largest.push(last.largest);
-			this.speed.push(last.speed);
+			const change = plane();
+			last = { numbers, largest: last.largest.map((value, body) => value + change[body]) };
+			this.add(time, { ...last, low, quantum });
 		}
-		this.rest = this.agesOfRest();
 	}
 
-	// For each frame and body, the share of `restMost` that the body has been at rest, of 255.
-	agesOfRest() {
-		const most = this.restMost();
-		let age = new Float32Array(this.bodies);
-		return this.speed.map((speed, frame) => {
-			const passed = frame === 0 ? 0 : this.times[frame] - this.times[frame - 1];
-			age = age.map((value, body) => speed[body] === 0 ? value + passed : 0);
-			return Uint8Array.from(age, value => Math.min(255, 255 * value / most));
-		});
+	// Adds a frame that was sent alone.
+	receive({ time, low, quantum, poses }) {
+		const bytes = bytesOfBase64(poses);
+		const words = NUMBERS * this.bodies;
+		this.add(time, { numbers: new Uint16Array(bytes.buffer, 0, words), largest: bytes.subarray(2 * words), low, quantum });
+		if (this.frames.length * this.bodies * (BYTES + 4) > BYTES_MOST) {
+			this.times.shift();
+			this.frames.shift();
+		}
 	}
 
-	// An age that has the last colour, s.
-	restMost() {
-		return Math.max(this.times[this.times.length - 1] / 2, 1e-6);
+	add(time, frame) {
+		frame.speed = this.speeds(frame, this.frames.at(-1), time - this.times.at(-1));
+		this.times.push(time);
+		this.frames.push(frame);
+	}
+
+	// The speed of each body since the frame before, m/s; 0 if rounding alone may have moved it.
+	speeds(now, before, passed) {
+		const speeds = new Float32Array(this.bodies);
+		if (!before || !(passed > 0)) return speeds;
+		const n = this.bodies;
+		const least = Math.max(SLOWEST * passed, 1.5 * now.quantum);
+		const along = (axis, body) => now.low[axis] - before.low[axis] +
+			now.quantum * now.numbers[axis * n + body] - before.quantum * before.numbers[axis * n + body];
+		for (let body = 0; body < n; body++) {
+			const distance = Math.hypot(along(0, body), along(1, body), along(2, body));
+			if (distance < least) continue;
+			speeds[body] = distance / passed;
+			this.speedMost = Math.max(this.speedMost, speeds[body]);
+		}
+		return speeds;
 	}
 
 	// Writes the poses of a frame as seven floats a body: x, y, z, and the quaternion.
-	poses(frame, into) {
-		const { low, quantum, componentMost } = this.head;
-		const numbers = this.numbers[frame];
-		const largest = this.largest[frame];
+	poses({ numbers, largest, low, quantum }, into) {
 		const n = this.bodies;
-		const scale = Math.SQRT2 / componentMost;
+		const scale = Math.SQRT2 / this.head.componentMost;
 		for (let body = 0, at = 0; body < n; body++, at += 7) {
 			into[at] = low[0] + quantum * numbers[body];
 			into[at + 1] = low[1] + quantum * numbers[n + body];

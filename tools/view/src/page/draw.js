@@ -14,6 +14,8 @@ precision highp float;
 uniform highp sampler2D bodies;
 uniform int firstBody;
 uniform mat4 matrix;
+uniform bool shadow;
+const vec3 LIGHT = vec3(${LIGHT.join(", ")});
 struct Body { vec3 position; vec4 rotation; vec3 colour; };
 Body bodyOf(int index) {
 	index += firstBody;
@@ -24,7 +26,12 @@ Body bodyOf(int index) {
 	return Body(place.xyz, texelFetch(bodies, at + ivec2(1, 0), 0), parts);
 }
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
-float shade(vec3 normal) { return 0.62 + 0.25 * normal.y + 0.2 * dot(normal, vec3(0.64, 0.0, 0.77)); }
+float shade(vec3 normal) { return 0.62 + 0.38 * dot(normal, LIGHT); }
+// Where a point is drawn: the point itself, or its shadow on the ground.
+vec4 drawn(vec3 point) {
+	if (shadow) point -= max(point.y, 0.0) / LIGHT.y * LIGHT;
+	return matrix * vec4(point.x, shadow ? 0.0 : point.y, point.z, 1.0);
+}
 `;
 
 // The corners of a box seen from a corner: 4, 5 and 6 are the last ones of the faces x, y and z.
@@ -43,11 +50,12 @@ void main() {
 	int corner = gl_VertexID - ${BOX_CORNERS} * index;
 	Body body = bodyOf(index);
 	vec4 back = vec4(-body.rotation.xyz, body.rotation.w);
-	vec3 side = mix(vec3(1), vec3(-1), lessThan(turned(back, eye - body.position), vec3(0)));
+	vec3 towards = shadow ? LIGHT : eye - body.position;
+	vec3 side = mix(vec3(1), vec3(-1), lessThan(turned(back, towards), vec3(0)));
 	vec3 axis = vec3(corner == 4, corner == 5, corner == 6);
 	colour = body.colour * shade(turned(body.rotation, side * axis));
 	local = CORNERS[corner];
-	gl_Position = matrix * vec4(body.position + turned(body.rotation, local * side * size), 1.0);
+	gl_Position = drawn(body.position + turned(body.rotation, local * side * size));
 }`;
 
 const BOX_FRAGMENT = `#version 300 es
@@ -72,7 +80,7 @@ void main() {
 	vec3 normal = texelFetch(surface, ivec2(corner, 1), 0).xyz;
 	colour = body.colour * shade(turned(body.rotation, normal));
 	vec3 place = texelFetch(surface, ivec2(corner, 0), 0).xyz;
-	gl_Position = matrix * vec4(body.position + turned(body.rotation, place), 1.0);
+	gl_Position = drawn(body.position + turned(body.rotation, place));
 }`;
 
 const MESH_FRAGMENT = `#version 300 es
@@ -104,13 +112,19 @@ out vec4 result;
 void main() {
 	vec2 at = place / spacing;
 	vec2 width = fwidth(at);
-	vec2 line = clamp(1.5 - abs(fract(at - 0.5) - 0.5) / width, 0.0, 1.0) * clamp(0.5 - width, 0.0, 0.5);
+	vec2 line = clamp(1.5 - abs(fract(at - 0.5) - 0.5) / width, 0.0, 1.0) * clamp(0.7 - width, 0.0, 0.45);
 	vec3 colour = ground * (1.0 - 0.5 * max(line.x, line.y));
 	result = vec4(mix(colour, back, smoothstep(0.3, 1.0, length(share))), 1.0);
 }`;
 
 // Floats of a body in the texture: position and colour, quaternion.
 const FLOATS = 8;
+// From so many bodies on, only bodies whose centre is not higher than some radii cast a shadow: a
+// software renderer takes as long for the shadows of all as for the bodies.
+const MANY = 4096;
+const CONTACT = 2.5;
+// The brightness that a shadow leaves.
+const SHADOW = 0.66;
 // Steps of the depth by which bodies are sorted.
 const BINS = 1024;
 // Most corners in one call.
@@ -119,13 +133,14 @@ const CORNERS_MOST = 1 << 20;
 class Painter {
 	constructor(canvas, head, kinds) {
 		this.canvas = canvas;
-		this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false });
+		this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false, stencil: true });
 		if (!this.gl) throw new Error("this browser has no WebGL2");
 		const gl = this.gl;
 		this.kinds = kinds;
 		this.rows = Math.max(Math.ceil(kinds.length / ROW), 1);
 		this.placed = new Float32Array(FLOATS * ROW * this.rows);
 		this.bodies = this.texture(2 * ROW, this.rows, this.placed);
+		this.around = head.kinds.map(kind => kind.around);
 		this.depths = new Float32Array(kinds.length);
 		this.order = new Uint32Array(kinds.length);
 		this.ends = new Uint32Array(BINS + 1);
@@ -165,7 +180,7 @@ class Painter {
 			const logs = gl.getAttachedShaders(program).map(shader => gl.getShaderInfoLog(shader));
 			throw new Error(`a shader does not build: ${logs.join(" ")}`);
 		}
-		const names = ["matrix", "bodies", "firstBody", "eye", "size", "surface", "corners", "middle", "reach", "ground", "back", "spacing"];
+		const names = ["matrix", "shadow", "bodies", "firstBody", "eye", "size", "surface", "corners", "middle", "reach", "ground", "back", "spacing"];
 		return { program, at: Object.fromEntries(names.map(name => [name, gl.getUniformLocation(program, name)])) };
 	}
 
@@ -220,16 +235,32 @@ class Painter {
 			const body = order[k];
 			const at = 7 * body;
 			if (!this.cover.isSeen(body, poses[at], poses[at + 1], poses[at + 2])) continue;
-			const to = FLOATS * this.shapes[kinds[body]].end++;
-			placed[to] = poses[at];
-			placed[to + 1] = poses[at + 1];
-			placed[to + 2] = poses[at + 2];
-			placed[to + 3] = colours[body];
-			placed[to + 4] = poses[at + 3];
-			placed[to + 5] = poses[at + 4];
-			placed[to + 6] = poses[at + 5];
-			placed[to + 7] = poses[at + 6];
+			this.put(body, poses, colours[body]);
 		}
+	}
+
+	// Places the bodies that cast a shadow: all, or of many only the ones near the ground.
+	placeShadows(poses) {
+		const n = this.kinds.length;
+		for (const shape of this.shapes) shape.end = shape.begin;
+		for (let body = 0; body < n; body++) {
+			const isNear = poses[7 * body + 1] < CONTACT * this.around[this.kinds[body]];
+			if (isNear || n < MANY) this.put(body, poses, 0);
+		}
+	}
+
+	put(body, poses, colour) {
+		const { placed } = this;
+		const at = 7 * body;
+		const to = FLOATS * this.shapes[this.kinds[body]].end++;
+		placed[to] = poses[at];
+		placed[to + 1] = poses[at + 1];
+		placed[to + 2] = poses[at + 2];
+		placed[to + 3] = colour;
+		placed[to + 4] = poses[at + 3];
+		placed[to + 5] = poses[at + 4];
+		placed[to + 6] = poses[at + 5];
+		placed[to + 7] = poses[at + 6];
 	}
 
 	// Draws the poses, seven floats a body, with a colour a body: red + 256 green + 65536 blue.
@@ -237,22 +268,48 @@ class Painter {
 		const gl = this.gl;
 		const matrix = camera.matrix(this.canvas.width / this.canvas.height);
 		this.place(poses, colours, camera, matrix);
+		this.upload();
+		gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+		gl.clearColor(...theme.back, 1);
+		gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+		for (const shape of this.shapes) this.drawKind(shape, matrix, camera, false);
+		this.drawGround(matrix, camera, theme);
+		this.drawShadows(poses, matrix, camera);
+	}
+
+	// Hands the placed bodies to the shaders.
+	upload() {
+		const gl = this.gl;
 		gl.activeTexture(gl.TEXTURE0);
 		gl.bindTexture(gl.TEXTURE_2D, this.bodies);
 		gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 2 * ROW, this.rows, gl.RGBA, gl.FLOAT, this.placed);
-		gl.viewport(0, 0, this.canvas.width, this.canvas.height);
-		gl.clearColor(...theme.back, 1);
-		gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-		for (const shape of this.shapes) this.drawKind(shape, matrix, camera);
-		this.drawGround(matrix, camera, theme);
 	}
 
-	drawKind(shape, matrix, camera) {
+	// Darkens the ground once where one shadow or several lie.
+	drawShadows(poses, matrix, camera) {
+		const gl = this.gl;
+		this.placeShadows(poses);
+		this.upload();
+		const states = [gl.STENCIL_TEST, gl.BLEND, gl.POLYGON_OFFSET_FILL];
+		for (const state of states) gl.enable(state);
+		gl.stencilFunc(gl.EQUAL, 0, 1);
+		gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+		gl.blendColor(SHADOW, SHADOW, SHADOW, 1);
+		gl.blendFunc(gl.ZERO, gl.CONSTANT_COLOR);
+		gl.polygonOffset(-1, -2);
+		gl.depthMask(false);
+		for (const shape of this.shapes) this.drawKind(shape, matrix, camera, true);
+		gl.depthMask(true);
+		for (const state of states) gl.disable(state);
+	}
+
+	drawKind(shape, matrix, camera, shadow) {
 		const gl = this.gl;
 		const { program, at } = shape.size ? this.box : this.mesh;
 		gl.useProgram(program);
 		gl.uniformMatrix4fv(at.matrix, false, matrix);
 		gl.uniform1i(at.bodies, 0);
+		gl.uniform1i(at.shadow, shadow);
 		if (shape.size) {
 			gl.uniform3fv(at.eye, camera.eye());
 			gl.uniform3fv(at.size, shape.size);

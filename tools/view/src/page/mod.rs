@@ -1,4 +1,5 @@
-//! Writes a recording as one HTML page that plays it, without a network.
+//! Writes a recording as one HTML page that plays it, without a network. The same page plays the
+//! frames that a server sends while a board steps.
 //!
 //! The page's parts are the files beside this module; their data comes from `quantise`.
 
@@ -8,7 +9,7 @@ use scene::Geometry;
 use serde_json::{Value, json};
 
 use crate::error::ViewError;
-use crate::kinds::surfaces;
+use crate::kinds::{COLOURS, surfaces};
 use crate::mesh::{Mesh, dot};
 use crate::quantise;
 use crate::recording::Recording;
@@ -18,7 +19,7 @@ pub use crate::quantise::Error;
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
 /// The scripts, in the order in which they use each other.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("decode.js"),
     include_str!("poses.js"),
     include_str!("camera.js"),
@@ -26,6 +27,7 @@ const SCRIPTS: [&str; 7] = [
     include_str!("draw.js"),
     include_str!("colours.js"),
     include_str!("player.js"),
+    include_str!("live.js"),
 ];
 
 /// The page of a recording.
@@ -47,41 +49,65 @@ pub fn page(
     facts: &[(&str, String)],
 ) -> Result<Page, ViewError> {
     let found = quantise::quantise(recording)?;
-    let surfaces = surfaces(recording.geometries())?;
-    let kinds = recording.geometries().iter().zip(&surfaces);
     let error = found.error;
-    let (low, high) = view(recording);
-    let head = json!({
-        "bodies": recording.bodies(),
-        "times": recording.frames().iter().map(|frame| frame.time).collect::<Vec<_>>(),
-        "kinds": kinds.map(|(geometry, mesh)| kind(geometry, mesh)).collect::<Vec<_>>(),
-        "low": found.low,
-        "quantum": found.quantum,
-        "componentMost": found.component_most,
-        "speedMost": found.speed_most,
-        "view": { "low": low, "high": high },
-    });
+    let mut head = head(recording)?;
+    head["times"] = recording.frames().iter().map(|frame| frame.time).collect();
+    head["low"] = found.low.as_slice().into();
+    head["quantum"] = found.quantum.into();
     let poses = format!("{} frames, {}", recording.frames().len(), error.text());
-    let facts: String = facts
-        .iter()
-        .chain(&[("poses", poses)])
-        .map(|(label, text)| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(label), escaped(text)))
-        .collect();
-    let poses = BASE64_STANDARD.encode(&found.bytes);
-    let script = SCRIPTS.join("\n");
-    let html = filled(
+    let facts: Vec<_> = facts.iter().cloned().chain([("poses", poses)]).collect();
+    let html = html(&head, title, &facts, &BASE64_STANDARD.encode(&found.bytes));
+    Ok(Page { html, error })
+}
+
+/// The page that plays the frames of the server it comes from; a recording of the start tells the
+/// bodies and the first view.
+///
+/// # Errors
+/// As for [`page`].
+#[cfg(feature = "live")]
+pub(crate) fn live(
+    start: &Recording,
+    title: &str,
+    facts: &[(&str, String)],
+) -> Result<String, ViewError> {
+    let mut head = head(start)?;
+    head["live"] = true.into();
+    // The bodies will fall: the first view has the ground, too.
+    head["view"]["low"][1] = 0.into();
+    Ok(html(&head, title, facts, ""))
+}
+
+/// The facts of all pages of a recording.
+fn head(recording: &Recording) -> Result<Value, ViewError> {
+    let surfaces = surfaces(recording.geometries())?;
+    let kinds = recording.geometries().iter().zip(&surfaces).zip(COLOURS.iter().cycle());
+    let (low, high) = view(recording);
+    Ok(json!({
+        "of": quantise::kinds(recording)?,
+        "kinds": kinds.map(|(of, colour)| kind(of, colour)).collect::<Vec<_>>(),
+        "componentMost": quantise::COMPONENT_MOST,
+        "view": { "low": low, "high": high },
+    }))
+}
+
+/// The text of a page.
+fn html(head: &Value, title: &str, facts: &[(&str, String)], poses: &str) -> String {
+    let fact = |(label, text): &(&str, String)| {
+        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(label), escaped(text))
+    };
+    filled(
         PAGE,
         &[
             ("title", &escaped(title)),
             ("style", STYLE),
-            ("facts", &facts),
+            ("facts", &facts.iter().map(fact).collect::<String>()),
             // Nothing in a JSON text may end the element around it.
             ("head", &head.to_string().replace('<', "\\u003c")),
-            ("poses", &poses),
-            ("script", &script),
+            ("poses", poses),
+            ("script", &SCRIPTS.join("\n")),
         ],
-    );
-    Ok(Page { html, error })
+    )
 }
 
 impl Error {
@@ -110,9 +136,9 @@ fn view(recording: &Recording) -> ([f32; 3], [f32; 3]) {
     ([0, 1, 2].map(|axis| most(axis, -1.0)), [0, 1, 2].map(|axis| most(axis, 1.0)))
 }
 
-/// The surface that the page draws for a geometry: a box by its size, all others by triangles; and
-/// the radii of the balls inside and around it.
-fn kind(geometry: &Geometry, mesh: &Mesh) -> Value {
+/// The surface that the page draws for a geometry: a box by its size, all others by triangles; its
+/// name and colour, and the radii of the balls inside and around it.
+fn kind((geometry, mesh): (&Geometry, &Mesh), colour: &[f32; 3]) -> Value {
     let places = mesh.positions.iter().zip(&mesh.normals);
     let inside = places.map(|(position, normal)| dot(*position, *normal));
     let inside =
@@ -123,6 +149,8 @@ fn kind(geometry: &Geometry, mesh: &Mesh) -> Value {
             },
         );
     let mut kind = json!({ "covering": inside, "around": geometry.bounding_radius() });
+    kind["name"] = geometry.name().into();
+    kind["colour"] = colour.as_slice().into();
     if let Geometry::Box { half_extents } = geometry {
         kind["box"] = json!(half_extents);
     } else {
@@ -182,7 +210,7 @@ mod tests {
         let (_, head) = html.split_once("id=\"head\">").expect("the head");
         let (head, _) = head.split_once("</script>").expect("its end");
         let head: Value = serde_json::from_str(head).expect("JSON");
-        assert_eq!(head["bodies"], 18);
+        assert_eq!(head["of"].as_array().map(Vec::len), Some(18));
         assert_eq!(head["times"].as_array().map(Vec::len), Some(6));
         let kinds = head["kinds"].as_array().expect("kinds");
         for (kind, geometry) in kinds.iter().zip(recording.geometries()) {

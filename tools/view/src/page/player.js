@@ -17,18 +17,32 @@ class Player {
 		this.canvas = element("picture");
 		this.painter = new Painter(this.canvas, head, recording.kinds);
 		this.camera = new Camera(head.view.low, head.view.high);
-		this.end = recording.times[recording.times.length - 1];
+		this.live = head.live === true;
 		this.time = 0;
 		this.resolution = 1;
 		this.pictures = 0;
 		this.playing = false;
-		element("scrub").max = this.end;
-		element("scrub").step = this.end > 0 ? this.end / 2000 : 1;
+		if (this.live) element("rate").parentElement.hidden = true;
 		this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-		this.setColour("speed");
+		this.setColour(head.kinds.length > 1 ? "kind" : "speed");
 		this.listen();
 		this.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
 		requestAnimationFrame(now => this.picture(now));
+	}
+
+	get begin() {
+		return this.recording.times[0];
+	}
+
+	get end() {
+		return this.recording.times.at(-1);
+	}
+
+	// The run has ended: from now on its frames play as the ones of a recording.
+	endLive() {
+		this.live = false;
+		element("rate").parentElement.hidden = false;
+		this.dirty = true;
 	}
 
 	setTheme(theme) {
@@ -40,31 +54,37 @@ class Player {
 	setColour(name) {
 		this.colour = name;
 		element("colour").value = name;
-		const colours = ramp(name);
-		const [title, low, high] = this.colouring.legend(name);
-		element("legend-title").textContent = title;
-		element("legend-low").textContent = low;
-		element("legend-high").textContent = high;
-		const pen = element("legend-ramp").getContext("2d");
-		for (let x = 0; x < 160; x++) {
-			const at = 4 * Math.round(x / 159 * 255);
-			pen.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
-			pen.fillRect(x, 0, 1, 10);
+		const { kinds } = this.recording.head;
+		element("legend-kinds").replaceChildren(...(name === "kind" ? kinds : []).map(kind => {
+			const item = document.createElement("span");
+			item.style.setProperty("--of", `rgb(${kind.colour.join(" ")})`);
+			item.textContent = kind.name;
+			return item;
+		}));
+		element("legend-scale").hidden = name === "kind";
+		if (name !== "kind") {
+			const colours = ramp(name);
+			const pen = element("legend-ramp").getContext("2d");
+			for (let x = 0; x < 160; x++) {
+				const at = 4 * Math.round(x / 159 * 255);
+				pen.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
+				pen.fillRect(x, 0, 1, 10);
+			}
 		}
 		this.dirty = true;
 	}
 
 	setPlaying(playing) {
-		if (playing && this.time >= this.end) this.setTime(0);
+		if (playing && !this.live && this.time >= this.end) this.setTime(this.begin);
 		this.atEnd = 0;
-		this.playing = playing && this.end > 0;
+		this.playing = playing && (this.live || this.end > this.begin);
 		element("play").textContent = this.playing ? "Pause" : "Play";
 		this.measured = null;
 		this.dirty = true;
 	}
 
 	setTime(time) {
-		this.time = Math.min(Math.max(time, 0), this.end);
+		this.time = Math.min(Math.max(time, this.begin), this.end);
 		this.dirty = true;
 	}
 
@@ -91,10 +111,14 @@ class Player {
 		if (this.dirty) this.draw();
 	}
 
-	// Plays on, and from the beginning after a look at the end.
+	// Plays on, and from the beginning after a look at the end; a run that steps plays its newest frame.
 	advance(passed) {
+		if (this.live) {
+			if (this.time !== this.end) this.setTime(this.end);
+			return;
+		}
 		this.atEnd = this.time < this.end ? 0 : this.atEnd + passed;
-		if (this.atEnd > END_SHOWN) this.setTime(0);
+		if (this.atEnd > END_SHOWN) this.setTime(this.begin);
 		else this.setTime(this.time + passed * Number(element("rate").value));
 	}
 
@@ -104,7 +128,13 @@ class Player {
 		const colours = this.colouring.at(this.colour, moment);
 		this.painter.draw(moment.poses, colours, this.camera, THEMES[this.theme]);
 		this.pictures++;
-		if (document.activeElement !== element("scrub") || this.playing) element("scrub").value = this.time;
+		const [title, low = "", high = ""] = this.colouring.legend(this.colour);
+		element("legend-title").textContent = title;
+		element("legend-low").textContent = low;
+		element("legend-high").textContent = high;
+		const scrub = element("scrub");
+		[scrub.min, scrub.max, scrub.step] = [this.begin, this.end, Math.max(this.end - this.begin, 1e-3) / 2000];
+		if (document.activeElement !== scrub || this.playing) scrub.value = this.time;
 		element("time").value = `${this.time.toFixed(2)} of ${this.end.toFixed(2)} s`;
 	}
 
@@ -121,8 +151,8 @@ class Player {
 		if (rate < PICTURES_WANTED && this.resolution > COARSEST) {
 			this.resolution = Math.max(COARSEST, this.resolution * 0.8);
 		}
-		const pixels = this.resolution < 1 ? `, ${Math.round(100 * this.resolution)} % of the pixels' rows` : "";
-		element("rhythm").value = `${rate.toFixed(0)} pictures/s${pixels}`;
+		const coarser = this.resolution < 1 ? ", coarser to keep up" : "";
+		element("rhythm").value = `${rate.toFixed(0)} frames a second${coarser}`;
 	}
 
 	resize() {
@@ -153,7 +183,7 @@ class Player {
 			" ": () => this.setPlaying(!this.playing),
 			",": () => this.stepFrames(-1),
 			".": () => this.stepFrames(1),
-			Home: () => this.setTime(0),
+			Home: () => this.setTime(this.begin),
 			End: () => this.setTime(this.end),
 			"+": () => this.camera.zoom(1 / 1.2),
 			"=": () => this.camera.zoom(1 / 1.2),
@@ -231,20 +261,3 @@ class Player {
 		}, { passive: false });
 	}
 }
-
-async function begin() {
-	const message = element("message");
-	message.hidden = false;
-	message.textContent = "Reading the poses ...";
-	try {
-		const head = JSON.parse(element("head").textContent);
-		const recording = new Recording(head, await inflate(bytesOfBase64(element("poses").textContent)));
-		window.player = new Player(recording);
-		message.hidden = true;
-	} catch (error) {
-		message.textContent = `This page cannot play: ${error.message}.`;
-		console.error(error);
-	}
-}
-
-begin();

@@ -1,15 +1,16 @@
 // Poses between two frames: the positions on a straight line, the orientations on the shorter arc,
-// normalised; the formula of `interpolate` in tools/scene/src/frames.rs.
+// normalised.
 
 class Between {
 	constructor(recording) {
 		this.recording = recording;
-		this.slots = [0, 1].map(() => ({ frame: -1, poses: new Float32Array(7 * recording.bodies) }));
+		this.slots = [0, 1].map(() => ({ frame: null, poses: new Float32Array(7 * recording.bodies) }));
 		this.poses = new Float32Array(7 * recording.bodies);
 	}
 
-	// The decoded poses of a frame; keeps those of the frame `beside`.
-	decoded(frame, beside) {
+	// The decoded poses of a frame; keeps the ones of the frame `beside`.
+	decoded(index, other) {
+		const [frame, beside] = [this.recording.frames[index], this.recording.frames[other]];
 		let slot = this.slots.find(slot => slot.frame === frame);
 		if (!slot) {
 			slot = this.slots.find(slot => slot.frame !== beside);

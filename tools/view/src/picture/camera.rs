@@ -98,6 +98,17 @@ impl View {
         })
     }
 
+    /// The distance from the eye to the middle, m.
+    pub(super) fn distance(&self) -> f32 {
+        let towards = minus(self.camera.eye, self.camera.target);
+        dot(towards, towards).sqrt()
+    }
+
+    /// The pixels of points; none if one is behind the eye.
+    pub(super) fn all(&self, points: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
+        points.iter().map(|point| self.project(*point)).collect()
+    }
+
     /// The point of the plane y = 0 at a pixel; none above the horizon.
     pub(super) fn ground(&self, x: f32, y: f32) -> Option<[f32; 3]> {
         let [right, up, back] = self.axes;

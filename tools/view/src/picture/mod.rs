@@ -1,54 +1,59 @@
-//! Draws bodies: one picture of one moment, as PNG.
+//! Draws bodies: one picture of one moment, or one that moves, as PNG.
 //!
 //! ```
 //! use scene::Geometry;
 //! use zynq_pgs::{Body, Pose, Velocity};
-//! use zynq_pgs_view::picture::{Camera, Picture};
+//! use zynq_pgs_view::Recording;
+//! use zynq_pgs_view::picture::Picture;
 //!
 //! let pose = Pose { position: [0.0, 1.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
 //! let bodies = [Body { pose, velocity: Velocity::default(), shape: 0 }];
-//! let camera = Camera::around([pose].iter(), 1.8, 1.5);
-//! let cubes = Picture::new(&bodies, &[Some(Geometry::CUBE)], camera);
-//! let picture = Picture { width: 300, height: 200, ..cubes };
+//! let mut recording = Recording::new(&bodies, &[Some(Geometry::CUBE)]);
+//! recording.add(0, 0.0, &bodies)?;
+//! let picture = Picture { width: 300, height: 200, ..Picture::of(&recording) };
 //! assert!(picture.png()?.starts_with(b"\x89PNG"));
 //! # Ok::<(), zynq_pgs_view::ViewError>(())
 //! ```
 
+mod backdrop;
 mod camera;
 mod faces;
+mod legend;
+mod moving;
 mod raster;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use scene::Geometry;
-use zynq_pgs::Body;
 
+use self::backdrop::{backdrop, spacing};
 use self::camera::View;
 use self::faces::Surfaces;
+use self::legend::Canvas;
+use self::moving::Pixels;
 use self::raster::{Raster, byte};
 use crate::error::ViewError;
+use crate::recording::{Frame, Recording};
 
 pub use self::camera::Camera;
 
 /// Pixels along an axis that are averaged to one.
 const FINE: u16 = 2;
-/// Colours of the sky from above to the horizon, of the ground, and of its lines.
-const SKY: [[f32; 3]; 2] = [[214.0, 224.0, 236.0], [240.0, 243.0, 247.0]];
-const GROUND: [f32; 3] = [206.0, 209.0, 213.0];
-/// Share of a colour that an outline leaves.
+/// Share of a colour that an outline leaves, and one that the darkest shadow leaves.
 const OUTLINE: f32 = 0.55;
+const SHADOW: f32 = 0.62;
 
-/// Most pixels a side, and in all: the finer picture has four times as many, of 16 bytes each.
+/// Seconds that the last moment of a moving picture stays.
+const END: f32 = 1.5;
+
+/// Most pixels a side, and in all: each has four finer ones of 32 bytes.
 const SIDE_MOST: u16 = 16_384;
-const PIXELS_MOST: u32 = 1 << 24;
+const PIXELS_MOST: u32 = 1 << 23;
 
 /// A picture to draw.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
-    /// The bodies; one whose shape has no geometry is not drawn.
-    pub bodies: &'a [Body],
-    /// The geometry of each shape.
-    pub geometries: &'a [Option<Geometry>],
+    /// The bodies at their moments. Bodies of one kind have the colour of their height at the first.
+    pub recording: &'a Recording,
     /// Where it is taken from.
     pub camera: Camera,
     /// Pixels across.
@@ -57,33 +62,37 @@ pub struct Picture<'a> {
     pub height: u16,
 }
 
-impl<'a> Picture<'a> {
-    /// Pixels of a picture of the usual size.
-    const SIZE: [u16; 2] = [1200, 720];
+/// The parts of a picture that all moments share.
+struct Stage<'a> {
+    surfaces: Surfaces<'a>,
+    view: View,
+    backdrop: Vec<[f32; 3]>,
+}
 
-    /// A picture of the usual size.
+impl<'a> Picture<'a> {
+    /// Pixels of a still picture, and of one that moves.
+    const STILL: [u16; 2] = [1200, 720];
+    const MOVING: [u16; 2] = [640, 360];
+
+    /// A picture of the usual size that shows all bodies of the last frame.
     #[must_use]
-    pub const fn new(
-        bodies: &'a [Body],
-        geometries: &'a [Option<Geometry>],
-        camera: Camera,
-    ) -> Self {
-        let [width, height] = Self::SIZE;
-        Self { bodies, geometries, camera, width, height }
+    pub fn of(recording: &'a Recording) -> Self {
+        let last = recording.frames().len().saturating_sub(1);
+        Self::around(recording, last, Self::STILL)
     }
 
-    /// A picture of the usual size that shows all bodies.
+    /// A smaller one that shows all bodies of the frames from the middle on.
     #[must_use]
-    pub fn of_all(bodies: &'a [Body], geometries: &'a [Option<Geometry>]) -> Self {
-        let drawn = bodies.iter().filter_map(|body| {
-            let geometry = geometries.get(usize::try_from(body.shape).ok()?)?.as_ref()?;
-            Some((&body.pose, geometry))
-        });
-        let radius = drawn.clone().map(|(_, geometry)| geometry.bounding_radius());
-        let radius = radius.fold(0.0, |most, radius| if radius > most { radius } else { most });
-        let [width, height] = Self::SIZE.map(f32::from);
-        let camera = Camera::around(drawn.map(|(pose, _)| pose), radius, width / height);
-        Self::new(bodies, geometries, camera)
+    pub fn moving(recording: &'a Recording) -> Self {
+        Self::around(recording, recording.frames().len() / 2, Self::MOVING)
+    }
+
+    fn around(recording: &'a Recording, first: usize, [width, height]: [u16; 2]) -> Self {
+        let radii = recording.geometries().iter().map(|geometry| geometry.bounding_radius());
+        let radius = radii.fold(0.0, |most, radius| if radius > most { radius } else { most });
+        let poses = recording.frames().iter().skip(first).flat_map(|frame| &frame.poses);
+        let aspect = f32::from(width) / f32::from(height);
+        Self { recording, camera: Camera::around(poses, radius, aspect), width, height }
     }
 
     /// Refuses a picture without pixels, or with too many.
@@ -96,26 +105,43 @@ impl<'a> Picture<'a> {
         Err(ViewError::Size { width, height, side: SIDE_MOST, pixels: PIXELS_MOST })
     }
 
-    /// The picture as PNG.
+    /// The last frame as PNG.
     ///
     /// # Errors
     /// [`ViewError`]: the picture has no pixels or too many, or a geometry has no surface.
     pub fn png(&self) -> Result<Vec<u8>, ViewError> {
-        let pixels = self.pixels()?;
+        let pixels = self.pixels(&self.stage()?, self.recording.frames().last(), None);
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width.into(), self.height.into());
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         let written = encoder.write_header().and_then(|mut writer| {
-            writer.write_image_data(&pixels)?;
+            writer.write_image_data(pixels.as_flattened())?;
             writer.finish()
         });
         written.map_err(ViewError::Png)?;
         Ok(bytes)
     }
 
-    /// The same inside of an SVG, for pages that take no other picture.
+    /// All frames as an animated PNG, at the speed of the simulated time; a program that plays none
+    /// shows the last.
+    ///
+    /// # Errors
+    /// As for [`png`](Self::png).
+    pub fn apng(&self) -> Result<Vec<u8>, ViewError> {
+        let (stage, frames) = (self.stage()?, self.recording.frames());
+        let still = self.pixels(&stage, frames.last(), None);
+        let ends = frames.iter().skip(1).map(|next| next.time);
+        let ends = ends.chain(frames.last().map(|last| last.time + END));
+        let moment = |(frame, end): (&Frame, f32)| {
+            (self.pixels(&stage, Some(frame), Some(frame.time)), end - frame.time)
+        };
+        let moments: Vec<_> = frames.iter().zip(ends).map(moment).collect();
+        moving::encode((self.width, self.height), &still, &moments)
+    }
+
+    /// The last frame inside of an SVG, for pages that take no other picture.
     ///
     /// # Errors
     /// As for [`png`](Self::png).
@@ -127,86 +153,78 @@ impl<'a> Picture<'a> {
         ))
     }
 
-    /// Red, green and blue of each pixel.
-    fn pixels(&self) -> Result<Vec<u8>, ViewError> {
+    fn stage(&self) -> Result<Stage<'a>, ViewError> {
         self.check()?;
-        let surfaces = Surfaces::of(self.bodies, self.geometries)?;
+        let surfaces = Surfaces::of(self.recording)?;
         let [width, height] = [self.width, self.height].map(|length| length * FINE);
         let view = View::new(self.camera, width, height);
-        let mut raster = Raster::new(width, height);
-        let mut number = 0;
-        surfaces.for_each(&view, |face| {
-            number += 1;
-            raster.fill(number, &face);
-        });
-        let side = usize::from(FINE);
-        let mut pixels = Vec::with_capacity(3 * usize::from(self.width) * usize::from(self.height));
-        for y in 0..usize::from(self.height) {
-            for x in 0..usize::from(self.width) {
-                let mut sums = [0.0; 3];
-                for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
-                    let colour = colour(&raster, &view, side * x + i, side * y + j);
-                    sums = [0, 1, 2].map(|k: usize| sums[k] + colour[k]);
-                }
-                let count = f32::from(FINE * FINE);
-                // Steps of four shades: the eye sees no difference, the compression does.
-                pixels.extend(sums.map(|sum| byte(sum / count) & 0xFC | 2));
-            }
+        Ok(Stage { surfaces, view, backdrop: backdrop(&view, width, height) })
+    }
+
+    /// The pixels of a frame, with a legend, and with the time of one that moves.
+    fn pixels(&self, stage: &Stage, frame: Option<&Frame>, time: Option<f32>) -> Pixels {
+        let Stage { surfaces, view, backdrop } = stage;
+        let mut raster = Raster::new(self.width * FINE, self.height * FINE);
+        if let Some(frame) = frame {
+            let mut number = 0;
+            surfaces.for_each(frame, view, |face| {
+                number += 1;
+                raster.fill(number, &face);
+            });
+            surfaces.shadows(frame, view, |corners, darkness| raster.darken(corners, darkness));
         }
-        Ok(pixels)
+        let (side, width) = (usize::from(FINE), usize::from(self.width));
+        let mut pixels = Vec::with_capacity(width * usize::from(self.height));
+        for (y, x) in (0..usize::from(self.height)).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let mut sums = [0.0; 3];
+            for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+                let colour = colour(&raster, backdrop, side * x + i, side * y + j);
+                sums = [0, 1, 2].map(|k: usize| sums[k] + colour[k]);
+            }
+            pixels.push(sums.map(|sum| sum / f32::from(FINE * FINE)));
+        }
+        let mut canvas = Canvas { width, pixels: &mut pixels };
+        canvas.legend(self.recording.geometries(), spacing(view));
+        time.into_iter().for_each(|time| canvas.time(time));
+        // Steps of four shades: the eye sees no difference, the compression does.
+        pixels.iter().map(|pixel| pixel.map(|part| byte(part) & 0xFC | 2)).collect()
     }
 }
 
 /// The colour of a fine pixel.
-fn colour(raster: &Raster, view: &View, x: usize, y: usize) -> [f32; 3] {
-    let shade = if raster.is_edge(x, y) { OUTLINE } else { 1.0 };
-    let colour = match raster.at(x, y) {
-        Some(pixel) => pixel.colour.map(f32::from),
-        None => behind(raster, view, x, y),
+fn colour(raster: &Raster, backdrop: &[[f32; 3]], x: usize, y: usize) -> [f32; 3] {
+    let outline = if raster.is_edge(x, y) { OUTLINE } else { 1.0 };
+    let (colour, shade) = match raster.at(x, y) {
+        Some(pixel) => (pixel.colour.map(f32::from), outline),
+        None => {
+            let shadow = 1.0 - (1.0 - SHADOW) * raster.shadow(x, y);
+            (backdrop[y * raster.width + x], outline * shadow)
+        }
     };
     colour.map(|value| shade * value)
-}
-
-/// The colour of the ground or the sky.
-fn behind(raster: &Raster, view: &View, x: usize, y: usize) -> [f32; 3] {
-    let number = |index: usize| u16::try_from(index).map_or(0.0, f32::from);
-    let share = number(y) / number(raster.height).max(1.0);
-    let sky = [0, 1, 2].map(|k: usize| (1.0 - share) * SKY[0][k] + share * SKY[1][k]);
-    let Some([right, _, towards]) = view.ground(number(x) + 0.5, number(y) + 0.5) else {
-        return sky;
-    };
-    let [eye_right, _, eye_towards] = view.eye();
-    let (across, along) = (right - eye_right, towards - eye_towards);
-    // The ground fades to the sky with the distance, in units of the eye's height.
-    let distance = (across * across + along * along).sqrt() / view.eye()[1];
-    let fade = ((distance - 1.5) / 6.0).clamp(0.0, 1.0);
-    [0, 1, 2].map(|k: usize| (1.0 - fade) * GROUND[k] + fade * sky[k])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scene::{Scene, ShapesOptions};
-
-    fn scene() -> Scene {
-        let grid = "3x2x3".parse().expect("a grid");
-        Scene::of_shapes(&ShapesOptions { grid, drop: 0.0, seed: 2 }).expect("a scene")
-    }
+    use crate::recording::fixture;
+    use std::collections::BTreeSet;
+    use std::io::Cursor;
 
     #[test]
     fn the_decoded_png_is_the_picture_and_shows_bodies_before_ground_and_sky() {
-        let scene = scene();
-        let whole = Picture::of_all(scene.bodies(), scene.geometries());
-        let picture = Picture { width: 150, height: 90, ..whole };
+        let recording = fixture(1);
+        let picture = Picture { width: 150, height: 90, ..Picture::of(&recording) };
         let bytes = picture.png().expect("encoded");
-        let decoder = png::Decoder::new(std::io::Cursor::new(&bytes));
-        let mut reader = decoder.read_info().expect("a header");
+        let mut reader = png::Decoder::new(Cursor::new(&bytes)).read_info().expect("a header");
         assert_eq!((reader.info().width, reader.info().height), (150, 90));
         let mut pixels = vec![0; 3 * 150 * 90];
         reader.next_frame(&mut pixels).expect("pixels");
-        assert_eq!(pixels, picture.pixels().expect("drawn"));
+        let stage = picture.stage().expect("surfaces");
+        let drawn = picture.pixels(&stage, recording.frames().last(), None);
+        assert_eq!(pixels, drawn.as_flattened());
         // Six kinds of bodies in their colours, lit from several sides.
-        let colours: std::collections::BTreeSet<&[u8]> = pixels.chunks(3).collect();
+        let colours: BTreeSet<&[u8]> = pixels.chunks(3).collect();
         assert!(colours.len() > 100, "{}", colours.len());
         assert_eq!(picture.png().expect("encoded"), bytes);
         let svg = picture.svg().expect("encoded");
@@ -216,13 +234,30 @@ mod tests {
     }
 
     #[test]
+    fn bodies_on_the_ground_darken_it_beside_them() {
+        let recording = fixture(1);
+        let picture = Picture { width: 150, height: 90, ..Picture::of(&recording) };
+        let stage = picture.stage().expect("surfaces");
+        let with = picture.pixels(&stage, recording.frames().last(), None);
+        let none = picture.pixels(&stage, None, None);
+        let sum = |pixel: &[u8; 3]| pixel.map(u32::from).iter().sum::<u32>();
+        let is_grey = |pixel: &[u8; 3]| pixel[0].abs_diff(pixel[2]) < 16;
+        let darker = with
+            .iter()
+            .zip(&none)
+            .filter(|(with, none)| is_grey(with) && is_grey(none) && sum(with) + 60 < sum(none));
+        assert!(darker.count() > 100, "shadows");
+    }
+
+    #[test]
     fn a_picture_without_pixels_or_with_too_many_is_refused() {
-        let scene = scene();
-        let whole = Picture::of_all(scene.bodies(), scene.geometries());
+        let recording = fixture(1);
         for (width, height) in [(0, 720), (1200, 0), (SIDE_MOST + 1, 1), (5000, 5000)] {
-            let picture = Picture { width, height, ..whole };
-            let said = picture.png().expect_err("png").to_string();
-            assert!(said.ends_with(&format!("found {width} by {height}")), "{said}");
+            let picture = Picture { width, height, ..Picture::of(&recording) };
+            for found in [picture.png(), picture.apng()] {
+                let said = found.expect_err("no picture").to_string();
+                assert!(said.ends_with(&format!("found {width} by {height}")), "{said}");
+            }
         }
     }
 }

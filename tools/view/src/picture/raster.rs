@@ -8,6 +8,8 @@ pub(super) struct Raster {
     pub(super) width: usize,
     pub(super) height: usize,
     pixels: Vec<Pixel>,
+    /// How dark the ground is at each pixel, from 0 to 1.
+    shadow: Vec<f32>,
 }
 
 /// The nearest face at a pixel.
@@ -28,7 +30,8 @@ impl Raster {
     pub(super) fn new(width: u16, height: u16) -> Self {
         let (width, height) = (usize::from(width), usize::from(height));
         let empty = Pixel { inverse: 0.0, face: 0, body: 0, colour: [0; 3] };
-        Self { width, height, pixels: vec![empty; width * height] }
+        let count = width * height;
+        Self { width, height, pixels: vec![empty; count], shadow: vec![0.0; count] }
     }
 
     /// The pixel, if a face covers it.
@@ -54,35 +57,58 @@ impl Raster {
 
     /// Draws a face under its number, from 1.
     pub(super) fn fill(&mut self, number: u32, face: &Face) {
+        let Self { width, height, pixels, .. } = self;
         for k in 2..face.corners.len() {
-            let corners = [0, k - 1, k].map(|index| (face.corners[index], face.colours[index]));
-            self.triangle(number, face.body, corners);
+            let [a, b, c] = [0, k - 1, k].map(|index| face.corners[index]);
+            let [ca, cb, cc] = [0, k - 1, k].map(|index| face.colours[index]);
+            Self::cover([a, b, c], (*width, *height), |place, [wa, wb, wc]| {
+                let inverse = (wa * a[2] + wb * b[2]) + wc * c[2];
+                let pixel = &mut pixels[place];
+                if inverse > pixel.inverse {
+                    let colour =
+                        [0, 1, 2].map(|k: usize| byte((wa * ca[k] + wb * cb[k]) + wc * cc[k]));
+                    *pixel = Pixel { inverse, face: number, body: face.body, colour };
+                }
+            });
         }
     }
 
-    fn triangle(&mut self, face: u32, body: u32, corners: [([f32; 3], [f32; 3]); 3]) {
-        let [(a, ca), (b, cb), (c, cc)] = corners;
+    /// Darkens the ground within these corners.
+    pub(super) fn darken(&mut self, corners: &[[f32; 3]], darkness: f32) {
+        let Self { width, height, shadow, .. } = self;
+        for pair in corners.get(1..).unwrap_or_default().windows(2) {
+            let corners = [corners[0], pair[0], pair[1]];
+            Self::cover(corners, (*width, *height), |place, _| {
+                shadow[place] = if darkness > shadow[place] { darkness } else { shadow[place] };
+            });
+        }
+    }
+
+    /// How dark the ground is at a pixel, from 0 to 1.
+    pub(super) fn shadow(&self, x: usize, y: usize) -> f32 {
+        self.shadow[y * self.width + x]
+    }
+
+    /// Calls `draw` with each pixel of a triangle, and the shares of its corners there.
+    fn cover(
+        [a, b, c]: [[f32; 3]; 3],
+        (width, height): (usize, usize),
+        mut draw: impl FnMut(usize, [f32; 3]),
+    ) {
         let area = twice_area(a, b, c);
         // The corners run counter-clockwise from outside; with y downwards their area is negative.
         if area >= 0.0 || !area.is_finite() {
             return;
         }
-        let columns = Self::span([a[0], b[0], c[0]], self.width);
-        for y in Self::span([a[1], b[1], c[1]], self.height) {
+        let columns = Self::span([a[0], b[0], c[0]], width);
+        for y in Self::span([a[1], b[1], c[1]], height) {
             for x in columns.clone() {
                 let middle = [centre(x), centre(y), 0.0];
                 let wa = twice_area(b, c, middle) / area;
                 let wb = twice_area(c, a, middle) / area;
                 let wc = twice_area(a, b, middle) / area;
-                if wa < 0.0 || wb < 0.0 || wc < 0.0 {
-                    continue;
-                }
-                let inverse = (wa * a[2] + wb * b[2]) + wc * c[2];
-                let pixel = &mut self.pixels[y * self.width + x];
-                if inverse > pixel.inverse {
-                    let colour =
-                        [0, 1, 2].map(|k: usize| byte((wa * ca[k] + wb * cb[k]) + wc * cc[k]));
-                    *pixel = Pixel { inverse, face, body, colour };
+                if wa >= 0.0 && wb >= 0.0 && wc >= 0.0 {
+                    draw(y * width + x, [wa, wb, wc]);
                 }
             }
         }

@@ -4,7 +4,6 @@
 use std::io::Write;
 
 use bitstream_model::Direction;
-use bitstream_model::interface::profile::FLOAT;
 use serde_json::json;
 
 use super::cells::{self, Cell};
@@ -13,8 +12,9 @@ use super::{FaultsArgs, list, try_all};
 use pgs_command::board;
 use pgs_command::common::CommonArgs;
 use pgs_command::failure::{Result, Verdict};
-use pgs_command::output::SCHEMA;
 use pgs_command::output::table::{Cell as Shown, Table, text};
+use pgs_command::output::width::terminal;
+use pgs_command::output::{BAD, SCHEMA};
 
 /// A cell, and its results on the model and on the hardware.
 struct Pair {
@@ -43,11 +43,11 @@ impl Pair {
 
 /// Tries all cells on both.
 pub(super) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
-    let profile = args.profile.unwrap_or(&FLOAT);
-    let bench = Bench::like_simulator(profile)?;
+    let build = args.built.board.unwrap_or_default();
+    let bench = Bench::like_simulator(&build)?;
     let cells = cells::for_simulator(&bench);
     if args.list {
-        return list(&[(profile.name.to_owned(), cells)], common, out);
+        return list(&[(build.to_string(), cells)], common, out);
     }
     // A simulator that cannot be used is refused here, with the reason, and not cell by cell.
     board::emulated_board(bench.config, &common.accelerator)?;
@@ -101,11 +101,11 @@ fn print(pairs: &[Pair], out: &mut dyn Write) -> Result<()> {
             ("equal", "equal\ncells", equal),
         ]);
     }
-    write!(out, "{}", table.to_text(usize::MAX))?;
+    write!(out, "{}", table.to_text(usize::MAX, terminal()))?;
     for pair in pairs.iter().filter(|pair| !pair.equal()) {
         writeln!(
             out,
-            "FAILED '{}': model {}, hardware {} ({})",
+            "{BAD}FAILED{BAD:#} '{}': model {}, hardware {} ({})",
             pair.cell.plan,
             pair.model.cause.unwrap_or("none"),
             pair.hardware.cause.unwrap_or("none"),

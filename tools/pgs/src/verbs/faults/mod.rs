@@ -11,30 +11,33 @@ mod trial;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use bitstream_model::interface::profile::{PROFILES, Profile};
+use bitstream_model::interface::profile::PROFILES;
 use clap::Args;
 use indicatif::ProgressBar;
 use pgs_support::Crew;
 use serde_json::{Value, json};
+use zynq_pgs::emulation::Build;
 
 use self::cells::{Cell, Impossible};
 use self::table::Tally;
 use self::trial::{Bench, CellResult, Start};
-use pgs_command::common::{AcceleratorChoice, AcceleratorOptions, CommonArgs};
+use pgs_command::common::{AcceleratorOptions, CommonArgs};
 use pgs_command::environment;
 use pgs_command::failure::{Result, Verdict};
+use pgs_command::options::build::BuiltArgs;
 use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::whole;
 use pgs_command::output::progress::progress_bar;
 
 const EXAMPLES: &str = "\
 Examples:
-  pgs faults                      every profile
-  pgs faults --profile float
-  pgs faults --list               the fault of each cell, without trying it
+  pgs faults                           every profile
+  pgs faults --board emulated:float
+  pgs faults --list                    the fault of each cell, without trying it
   pgs faults --json > faults.json
   pgs run --grid 3x3x3 --steps 2 --fault 'stall@dma1.mm2s,phase=contact2,beat=5'
 
-Examples with the Verilog in simulation (docs/bitstream.md):
+Examples with the Verilog in simulation (docs/to-a-board.md):
   pgs faults --accelerator rtl:rtl-sim/pgs-rtl     stream faults, on the generated hardware too
 
 Profiles that can start warm are tried cold and, as NAME+warm, with impulses that come in and go \
@@ -49,19 +52,18 @@ A cell is one fault at one place. It passes if the fault happened, and
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FaultsArgs {
-    /// Try this profile only.
-    #[arg(long, value_name = "PROFILE", value_parser = pgs_command::options::build::profile())]
-    profile: Option<&'static Profile>,
     /// Print the fault of each cell, and try none.
     #[arg(long)]
     list: bool,
     #[command(flatten)]
+    pub(crate) built: BuiltArgs,
+    #[command(flatten)]
     pub(crate) accelerator: AcceleratorOptions,
 }
 
-/// The results of a profile's cells.
+/// The results of a build's cells.
 struct ProfileResults {
-    /// The profile, and whether its steps start warm.
+    /// The build, and whether its steps start warm.
     name: String,
     cells: Vec<(Cell, CellResult)>,
     impossible: Vec<Impossible>,
@@ -73,22 +75,20 @@ pub(crate) fn run(args: &FaultsArgs, common: &CommonArgs, out: &mut dyn Write) -
         // The driver would warn of each of thousands of faults.
         log::set_max_level(log::LevelFilter::Off);
     }
-    if common.accelerator != AcceleratorChoice::Model {
+    if common.accelerator.simulator.is_some() {
         return hardware::run(args, common, out);
     }
-    let profiles: Vec<_> = match args.profile {
-        Some(profile) => vec![profile],
-        None => PROFILES.to_vec(),
-    };
+    let of_profile = |&profile| Build { profile: Some(profile), ..Build::default() };
+    let every = || PROFILES.iter().map(of_profile).collect();
+    let builds: Vec<Build> = args.built.board.map_or_else(every, |build| vec![build]);
     let (mut all, mut listed) = (Vec::new(), Vec::new());
-    let starts = |profile| [Start::Cold, Start::Warm].map(|start| (profile, start));
-    let settings = profiles.into_iter().flat_map(starts);
-    for (profile, start) in settings {
-        let bench = Bench::new(profile, start)?;
+    let starts = |build| [Start::Cold, Start::Warm].map(|start| (build, start));
+    for (build, start) in builds.into_iter().flat_map(starts) {
+        let bench = Bench::new(&build, start)?;
         let (cells, impossible) = cells::of(&bench);
         let name = match start {
-            Start::Cold => profile.name.to_owned(),
-            Start::Warm => format!("{}+warm", profile.name),
+            Start::Cold => build.to_string(),
+            Start::Warm => format!("{build}+warm"),
         };
         if args.list {
             listed.push((name, cells));
@@ -127,7 +127,7 @@ fn list(
     }
     for (name, cells) in profiles {
         for cell in cells {
-            writeln!(out, "{name:12} {}", cell.plan)?;
+            whole(out, "", 0, &format!("{name} {}", cell.plan))?;
         }
     }
     Ok(Verdict::Done)

@@ -9,7 +9,10 @@ use super::cells::Cell;
 use super::expected::Expected;
 use super::trial::CellResult;
 use pgs_command::numbers::grouped;
+use pgs_command::output::BAD;
+use pgs_command::output::facts::whole;
 use pgs_command::output::table::{Cell as Shown, Table, text};
+use pgs_command::output::width::terminal;
 
 /// The number of cells that passed each check.
 #[derive(Debug, Clone, Copy, Default)]
@@ -86,7 +89,7 @@ pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<(
         Tally::of(of_kind()).row(&mut table, kind, must);
     }
     Tally::of(cells()).row(&mut table, "all", "");
-    write!(out, "{}", table.to_text(usize::MAX))?;
+    write!(out, "{}", table.to_text(usize::MAX, terminal()))?;
 
     writeln!(out)?;
     for ProfileResults { name, cells, .. } in all {
@@ -109,19 +112,19 @@ pub(super) fn print(all: &[ProfileResults], out: &mut dyn Write) -> io::Result<(
         let these = all.iter().filter_map(|tried| tried.impossible.get(place));
         let count: usize = these.clone().map(|impossible| impossible.cells).sum();
         let what = these.map(|impossible| impossible.what).next().unwrap_or_default();
-        writeln!(out, "not tried: {what} ({} cells)", grouped(count as u64))?;
+        let count = grouped(count as u64);
+        whole(out, "not tried: ", 11, &format!("{what} ({count} cells)"))?;
     }
     for ProfileResults { name, cells, .. } in all {
         for (cell, found) in cells.iter().filter(|(_, found)| !found.passed()) {
-            writeln!(
-                out,
-                "FAILED {} '{}': {}; cause {}, expected {:?}",
-                name,
+            let wrong = format!(
+                "{name} '{}': {}; cause {}, expected {:?}",
                 cell.plan,
                 found.failed_checks().join(", "),
                 found.cause.unwrap_or("none"),
                 cell.expected,
-            )?;
+            );
+            whole(out, &format!("{BAD}FAILED{BAD:#} "), 7, &wrong)?;
         }
     }
     Ok(())

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use bitstream_model::interface::profile::Profile;
 use bitstream_model::{BoardConfig, Delays, Direction, EmulatedBoard, FaultKind, PacketCount};
 use scene::{Grid, Scene, SceneOptions, WarmStart};
+use zynq_pgs::emulation::Build;
 use zynq_pgs::error::Aftermath;
 use zynq_pgs::{
     Accelerator, BoardChoice, Body, Collision, Collisions as _, Error, Impulses, OpenOptions,
@@ -150,7 +150,7 @@ pub(super) enum Start {
 impl Start {
     fn parameters(self) -> StepParameters {
         let warm = self == Self::Warm;
-        StepParameters::default().with_warm_start(warm).with_impulses_out(warm)
+        StepParameters::thesis().with_warm_start(warm).with_impulses_out(warm)
     }
 }
 
@@ -165,7 +165,8 @@ impl State {
         let grid = Grid::new(side, side, side).map_err(Failure::input)?;
         let options = SceneOptions { grid, drop: 0.05 };
         let mut scene = Scene::new(&options).map_err(Failure::input)?;
-        let (emulated, mut accelerator) = open(config, &AcceleratorChoice::Model, scene.shapes())?;
+        let (emulated, mut accelerator) =
+            open(config, &AcceleratorChoice::default(), scene.shapes())?;
         let parameters = start.parameters();
         let mut warm = WarmStart::default();
         for _ in 0..SETTLING {
@@ -208,25 +209,25 @@ impl State {
 }
 
 impl Bench {
-    /// The setting of a profile, with a pile of 27 cubes and one of 64, for the model.
-    pub(super) fn new(profile: &'static Profile, start: Start) -> Result<Self> {
+    /// The setting of a build, with a pile of 27 cubes and one of 64, for the model.
+    pub(super) fn new(build: &Build, start: Start) -> Result<Self> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
-        let length_width = LENGTH_WIDTH;
-        let config = BoardConfig { profile, length_width, delays, ..BoardConfig::default() };
+        let length_width = build.length_width.unwrap_or(LENGTH_WIDTH);
+        let config = BoardConfig { length_width, delays, ..build.config() };
         Self::of(config, start, DEADLINE)
     }
 
     /// The setting of a board that equals one with a simulator, for the model.
-    pub(super) fn like_simulator(profile: &'static Profile) -> Result<Self> {
+    pub(super) fn like_simulator(build: &Build) -> Result<Self> {
         let delays = Delays { fifo_beats: FIFO_BEATS, ..Delays::default() };
-        let config = BoardConfig { profile, delays, ..BoardConfig::default() };
+        let config = BoardConfig { delays, ..build.config() };
         Self::of(config, Start::Cold, SIMULATOR_DEADLINE)
     }
 
     fn of(config: BoardConfig, start: Start, deadline: Duration) -> Result<Self> {
         let (small, large) = (State::settled(3, config, start)?, State::settled(4, config, start)?);
         let parameters = start.parameters().with_deadline(deadline);
-        let accelerator = AcceleratorChoice::Model;
+        let accelerator = AcceleratorChoice::default();
         let (board, mut driver) = open(config, &accelerator, &small.shapes)?;
         let mut bodies = small.bodies.clone();
         driver.step(&mut bodies, &small.given(), &parameters).map_err(Failure::input)?;

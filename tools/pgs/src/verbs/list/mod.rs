@@ -16,6 +16,7 @@ use pgs_command::board;
 use pgs_command::common::{BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::output::SCHEMA;
+use pgs_command::output::facts::whole;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,8 +26,7 @@ Examples:
 A UIO node is recognised by its regions, independently of its name; its line shows the option that
 uses it.";
 
-/// List the boards: UIO nodes, DMA buffers, inaccessible devices with the reason, and the emulated
-/// board.
+/// List the boards of this system, and what keeps one from use
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {
@@ -36,6 +36,9 @@ pub(crate) struct ListArgs {
     #[command(flatten)]
     pub(crate) board: BoardOptions,
 }
+
+/// Columns of a label.
+const LABEL: usize = 12;
 
 /// Lists the boards.
 pub(crate) fn run(args: &ListArgs, common: &CommonArgs, out: &mut dyn Write) -> Result<Verdict> {
@@ -75,35 +78,35 @@ pub(crate) fn run(args: &ListArgs, common: &CommonArgs, out: &mut dyn Write) -> 
         return Ok(Verdict::Done);
     }
 
-    writeln!(out, "would open  {chosen} ({reason})")?;
+    let mut line =
+        |label: &str, text: String| whole(out, &format!("{label:<LABEL$}"), LABEL, &text);
+    line("would open", format!("{chosen} ({reason})"))?;
     if let Some(error) = error {
-        writeln!(out, "uio nodes   cannot be listed: {error}")?;
+        line("uio nodes", format!("cannot be listed: {error}"))?;
     } else if nodes.is_empty() && unreadable.is_empty() {
-        writeln!(out, "uio nodes   none in {}", system.uio.display())?;
+        line("uio nodes", format!("none in {}", system.uio.display()))?;
     }
     for Node { node, obstacle, .. } in &nodes {
         let state = obstacle.as_deref().unwrap_or("usable");
-        writeln!(out, "uio node    {} {:?}: {state}", node.device, node.name)?;
+        line("uio node", format!("{} {:?}: {state}", node.device, node.name))?;
         for map in &node.maps {
-            writeln!(
-                out,
-                "  map {}     {:?} at {:#x}, {} bytes",
-                map.index, map.name, map.address, map.bytes
-            )?;
+            let label = format!("  map {}", map.index);
+            line(&label, format!("{:?} at {:#x}, {} bytes", map.name, map.address, map.bytes))?;
         }
     }
     for node in &unreadable {
-        writeln!(out, "uio node    {} cannot be read: {}", node.device, explained(&node.error))?;
+        let error = explained(&node.error);
+        line("uio node", format!("{} cannot be read: {error}", node.device))?;
     }
     for buffer in &buffers {
-        writeln!(out, "u-dma-buf   {:?}: {}", buffer.name, buffer.text())?;
+        line("u-dma-buf", format!("{:?}: {}", buffer.name, buffer.text()))?;
     }
     for manager in &managers {
-        writeln!(out, "fpga        {manager}: {}", state(manager))?;
+        line("fpga", format!("{manager}: {}", state(manager)))?;
     }
     if let Some(error) = logic_error {
-        writeln!(out, "logic       {}", explained(&error))?;
+        line("logic", explained(&error))?;
     }
-    writeln!(out, "emulated    always available")?;
+    line("emulated", "always available".to_owned())?;
     Ok(Verdict::Done)
 }

@@ -73,13 +73,6 @@ impl Cold {
         Some(FinalState::of(scene, last))
     }
 
-    /// The pile at the end of `done` steps, for people.
-    pub(super) fn end_text(&mut self, done: u32) -> Option<String> {
-        let text =
-            |end: FinalState| format!("the same without warm start, one friction, {}", end.text());
-        self.end(done).map(text)
-    }
-
     /// The pile at the end of `done` steps, for programs.
     pub(super) fn end_json(&mut self, done: u32) -> Option<Value> {
         self.end(done).map(FinalState::to_json)
@@ -119,10 +112,10 @@ mod tests {
         let scene = Scene::new(&SceneOptions { grid, ..SceneOptions::default() }).expect("a scene");
         let mut accelerator = Accelerator::open(OpenOptions::default()).expect("an emulated board");
         accelerator.set_shapes(scene.shapes()).expect("two shapes");
-        let mut cold = Cold::new(scene, &StepParameters::default());
-        assert!(!cold.has_taken(1) && cold.end_text(1).is_none());
+        let mut cold = Cold::new(scene, &StepParameters::thesis());
+        assert!(!cold.has_taken(1) && cold.end_json(1).is_none());
         cold.step(1, &mut accelerator).expect("no fault").expect("no Ctrl-C");
-        assert!(cold.has_taken(1) && cold.end_text(1).is_some());
+        assert!(cold.has_taken(1) && cold.end_json(1).is_some());
         assert!(!cold.has_taken(2) && cold.end_json(2).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! The end of a run: its sums for people, and its document for programs.
+//! The end of a run: its figures for people, and its document for programs.
 
 use std::io::{self, Write};
 
@@ -6,72 +6,46 @@ use scene::Scene;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
-use super::summary::{BoardFacts, Summary};
+use super::summary::Summary;
 use super::{Course, RunArgs, is_emulated};
 use pgs_command::board::OpenBoard;
 use pgs_command::numbers::grouped;
-use pgs_command::options::bandwidth::bandwidth_text;
 use pgs_command::options::solver::time_step_text;
 use pgs_command::output::SCHEMA;
 use pgs_command::output::facts::fact;
 use step_folder::digest;
 
 /// The summary of the run; none before the first step.
-fn summary<'a>(
-    args: &RunArgs,
-    parameters: &'a StepParameters,
-    opened: &OpenBoard,
-    scene: &mut Scene,
-    course: &'a Course,
-) -> Option<Summary<'a>> {
+fn summary<'a>(opened: &OpenBoard, scene: &mut Scene, course: &'a Course) -> Option<Summary<'a>> {
     let last = course.last.as_ref()?;
-    let facts = BoardFacts {
-        profile: opened.accelerator.capabilities().variant.profile,
-        is_emulated: is_emulated(opened),
-        bandwidth: opened.config().map(|config| bandwidth_text(config.bandwidth)),
-    };
-    let cubes = args.scene.is_cubes();
-    Some(Summary::new(&course.totals, parameters, facts, cubes, (scene, last)))
+    Some(Summary::new(&course.totals, is_emulated(opened), (scene, last)))
 }
 
-/// Prints the sums of the run, for people.
+/// Prints the end of the run, for people: five lines, behind what went wrong.
 pub(super) fn print_end(
     args: &RunArgs,
-    parameters: &StepParameters,
     opened: &OpenBoard,
     scene: &mut Scene,
-    course: &mut Course,
+    course: &Course,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    writeln!(out)?;
-    let done = course.done;
-    let cold = course.cold.as_mut().and_then(|cold| cold.end_text(done));
-    let Course { done, retries, orders, footprint, .. } = &*course;
+    let Course { done, retries, .. } = course;
     if !course.is_complete(args.steps()) {
         let cold =
             if *done == args.steps() { "; the scene beside it lacks the last step" } else { "" };
         writeln!(out, "interrupted after {done} of {} steps{cold}", args.steps())?;
     }
     if let Some(faults) = opened.faults_text() {
-        writeln!(out, "{faults}")?;
+        fact(out, "faults", &faults)?;
     }
     if *retries > 0 {
         fact(out, "retries", &format!("{} of {done} steps", grouped(*retries)))?;
     }
-    if let Some(summary) = summary(args, parameters, opened, scene, course) {
-        summary.print(out)?;
-    }
     if let Some((energy, _)) = &course.energy {
         fact(out, "energy", energy)?;
     }
-    if let Some(cold) = cold {
-        fact(out, "cold", &cold)?;
-    }
-    if let Some(orders) = orders.text() {
-        fact(out, "orders", &orders)?;
-    }
-    if let Some(memory) = footprint.text() {
-        fact(out, "memory", &memory)?;
+    if let Some(summary) = summary(opened, scene, course) {
+        summary.print(out)?;
     }
     writeln!(out, "digest     {} {:016x}", digest::ALGORITHM, digest::of_bodies(scene.bodies()))
 }
@@ -96,7 +70,7 @@ pub(super) fn document(
     let steps = std::mem::take(&mut course.documents);
     let (done, complete) = (course.done, course.is_complete(args.steps()));
     let cold = course.cold.as_mut().and_then(|cold| cold.end_json(done));
-    let summary = summary(args, parameters, opened, scene, &course);
+    let summary = summary(opened, scene, &course);
     let digest = format!("{:016x}", digest::of_bodies(scene.bodies()));
     json!({
         "schema": SCHEMA,
@@ -110,7 +84,6 @@ pub(super) fn document(
         "energy": course.energy.as_ref().map(|(_, energy)| energy),
         "faults": opened.faults_json(),
         "traced": args.traced.to_json(course.inside),
-        "memory": course.footprint.to_json(),
         "digest": { "algorithm": digest::ALGORITHM, "value": digest },
     })
 }

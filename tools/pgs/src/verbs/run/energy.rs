@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::power::{HWMON, PowerMeter, Sensors, at_thesis_power};
+use crate::power::{HWMON, PowerMeter, Sensors};
 
 /// The sensors of a real board, if it has any.
 pub(super) fn sensors(is_emulated: bool) -> Option<Sensors> {
@@ -32,26 +32,13 @@ pub(super) fn start(sensors: Option<Sensors>, is_alone: bool) -> Option<PowerMet
     }
 }
 
-/// The energy of a step for people and for programs: measured, or at the thesis' power for a step
-/// that takes `ms` milliseconds. None without a step.
-pub(super) fn end(meter: Option<PowerMeter>, steps: u32, ms: f64) -> Option<(String, Value)> {
-    let steps = NonZeroU32::new(steps)?;
-    match meter.map(|meter| meter.stop(steps)) {
-        Some(Ok(Some(energy))) => return Some((energy.text(), energy.to_json())),
-        Some(Ok(None)) => log::warn!("the energy is not measured: the steps ended too early"),
-        Some(Err(error)) => log::warn!("the energy is not measured: {error}"),
-        None => {}
+/// The measured energy of a step, for people and for programs. None without sensors, and without a
+/// step.
+pub(super) fn end(meter: Option<PowerMeter>, steps: u32) -> Option<(String, Value)> {
+    match meter?.stop(NonZeroU32::new(steps)?) {
+        Ok(Some(energy)) => return Some((energy.text(), energy.to_json())),
+        Ok(None) => log::warn!("the energy is not measured: the steps ended too early"),
+        Err(error) => log::warn!("the energy is not measured: {error}"),
     }
-    Some(at_thesis_power(ms))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_step_has_no_energy() {
-        assert!(end(None, 0, 0.0).is_none());
-        assert!(end(None, 1, 2.0).is_some());
-    }
+    None
 }

@@ -1,6 +1,8 @@
-//! The files of a run's poses: arrays, glTF, a page and a picture.
+//! The files of a run's poses: arrays, a page and a picture.
 
 use std::io::Write as _;
+#[cfg(feature = "live")]
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,7 +12,9 @@ use step_folder::replace::replace;
 use thiserror::Error;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
-use zynq_pgs_view::{ViewError, gltf, npz};
+#[cfg(feature = "live")]
+use zynq_pgs_view::{Recording, live::Live};
+use zynq_pgs_view::{ViewError, npz};
 
 use super::film::Film;
 use pgs_command::failure::{Cause, Failure, Result};
@@ -24,43 +28,65 @@ const FRAMES: u32 = 200;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Poses")]
 pub(crate) struct FileArgs {
-    /// Write the poses: .npz for numpy, .glb for 3D programs; `docs/command-line.md` has the
-    /// arrays.
+    /// Write the poses as arrays for numpy; `docs/command-line.md` has their shapes.
     #[arg(
         long,
-        value_name = "FILE.npz|glb",
-        value_parser = |text: &str| with_extension(text, &["npz", "glb"])
+        value_name = "FILE.npz",
+        value_parser = |text: &str| with_extension(text, &["npz"])
     )]
     poses: Option<PathBuf>,
-    /// Write a page that plays the poses in a browser, without a network.
+    /// Write a page that plays the poses
+    ///
+    /// In a browser, without a network.
     #[arg(
         long,
         value_name = "FILE.html",
         value_parser = |text: &str| with_extension(text, &["html"])
     )]
     view: Option<PathBuf>,
-    /// Write a picture of the last step.
+    /// Write a picture of the end, or of the run, which moves
+    ///
+    /// .png of the last step, .apng of the whole run; a name for pages that know only .png ends in
+    /// .apng.png.
     #[arg(
         long,
-        value_name = "FILE.png",
-        value_parser = |text: &str| with_extension(text, &["png"])
+        value_name = "FILE.png|apng",
+        value_parser = |text: &str| with_extension(text, &["png", "apng"])
     )]
     picture: Option<PathBuf>,
-    /// Record every K-th step [default: the smallest K that gives at most 200 frames]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
-    every: Option<u32>,
-    /// Record about N frames beside the start, evenly spread.
-    #[arg(
-        long,
-        value_name = "N",
-        conflicts_with = "every",
-        value_parser = clap::value_parser!(u32).range(1..)
-    )]
-    frames: Option<u32>,
+    /// Serve a page that plays the run while the board steps, on this machine, or at an ADDRESS of
+    /// its network
+    ///
+    /// The command prints the address of the page, which has a random token.
+    #[cfg(feature = "live")]
+    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = loopback_or)]
+    live: Option<SocketAddr>,
+    /// Frames of a simulated second, a step each [default: about 200 of the run]
+    #[arg(long, value_name = "N", value_parser = frames_per_second)]
+    fps: Option<f32>,
+}
+
+fn frames_per_second(text: &str) -> Result<f32, String> {
+    let frames = text.parse().ok().filter(|frames| (0.01..=1e6).contains(frames));
+    frames.ok_or_else(|| "expected frames of a second, from 0.01 to 1000000".to_owned())
+}
+
+/// An address with a port; a port alone is one of this machine.
+#[cfg(feature = "live")]
+fn loopback_or(text: &str) -> Result<SocketAddr, String> {
+    let port = text.parse().map(|port: u16| (Ipv4Addr::LOCALHOST, port).into());
+    let address = port.or_else(|_| text.parse());
+    address.map_err(|_| "expected a port, or an address with one as 192.0.2.7:8000".to_owned())
 }
 
 fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or("")
+}
+
+/// Whether a picture of that name moves.
+fn is_moving(picture: &Path) -> bool {
+    let name = picture.to_string_lossy();
+    name.ends_with(".apng") || name.ends_with(".apng.png")
 }
 
 /// A path whose extension names a format that can be written.
@@ -84,7 +110,7 @@ impl Unfit {
     fn failure(path: &Path, source: ViewError) -> Failure {
         let is_size = matches!(source, ViewError::TooLarge(_));
         let failure = Failure::input(Self { path: path.to_owned(), source });
-        if is_size { failure.next("give --every or --frames with fewer frames") } else { failure }
+        if is_size { failure.next("give a smaller --fps") } else { failure }
     }
 }
 
@@ -105,24 +131,38 @@ impl FileArgs {
         self.given().map(|(name, path)| Named::option(name, path))
     }
 
-    /// Begins to record a scene at its start; `None` if no file shows its course.
+    /// Begins to record a scene at its start; `None` if no file shows it.
     pub(super) fn film(&self, scene: &Scene, steps: u32, time_step: f32) -> Result<Option<Film>> {
-        if self.poses.is_none() && self.view.is_none() {
-            return Ok(None);
+        if self.poses.is_none()
+            && self.view.is_none()
+            && self.picture.as_deref().is_none_or(|picture| !is_moving(picture))
+        {
+            // A still picture shows the end, with colours of the start.
+            let still = self.picture.is_some().then(|| Film::new(scene, 0.0, time_step));
+            return still.transpose();
         }
-        let every = steps.div_ceil(self.frames.unwrap_or(FRAMES)).max(1);
-        Film::new(scene, self.every.unwrap_or(every), time_step).map(Some)
+        let a_step = match self.fps {
+            Some(fps) => f64::from(fps) / f64::from(1.0 / time_step),
+            None => 1.0 / f64::from(steps.div_ceil(FRAMES)),
+        };
+        Film::new(scene, a_step, time_step).map(Some)
     }
 
-    /// Writes the picture of a scene.
-    pub(super) fn write_picture(&self, scene: &Scene) -> Result<Option<Written>> {
-        let Some(path) = &self.picture else { return Ok(None) };
-        let picture = Picture::of_all(scene.bodies(), scene.geometries());
-        let Picture { width, height, .. } = picture;
-        let bytes = picture.png().map_err(|error| Failure::new(Cause::Output, error))?;
-        let document = json!({ "width": width, "height": height });
-        Written::new("picture", path, &bytes, format!("{width} x {height} pixels"), document)
-            .map(Some)
+    /// Begins to serve the page of a run that steps, and prints its address; `None` without the option.
+    #[cfg(feature = "live")]
+    pub(super) fn live(
+        &self,
+        scene: &Scene,
+        title: &str,
+        facts: &[(&str, String)],
+    ) -> Result<Option<Live>> {
+        let Some(address) = self.live else { return Ok(None) };
+        let mut start = Recording::new(scene.bodies(), scene.geometries());
+        let live = start.add(0, 0.0, scene.bodies());
+        let live = live.and_then(|()| Live::start(address, &start, title, facts));
+        let live = live.map_err(|error| Failure::new(Cause::Output, error))?;
+        writeln!(std::io::stderr(), "live at {}", live.url())?;
+        Ok(Some(live))
     }
 
     /// Writes the files of a course; returns what was written.
@@ -137,10 +177,7 @@ impl FileArgs {
         let bodies = grouped(recording.bodies() as u64);
         let mut written = Vec::new();
         if let Some(path) = &self.poses {
-            let bytes = match extension(path) {
-                "glb" => gltf::binary(recording),
-                _ => npz::bytes(recording).map_err(ViewError::from),
-            };
+            let bytes = npz::bytes(recording).map_err(ViewError::from);
             let bytes = bytes.map_err(|error| Unfit::failure(path, error))?;
             let text = format!("{frames} frames of {bodies} bodies");
             written.push(Written::new("poses", path, &bytes, text, json!({ "frames": frames }))?);
@@ -155,6 +192,18 @@ impl FileArgs {
                 "largest_error_degrees": page.error.angle,
             });
             written.push(Written::new("view", path, page.html.as_bytes(), text, document)?);
+        }
+        if let Some(path) = &self.picture {
+            let (picture, moves) = match is_moving(path) {
+                true => (Picture::moving(recording), format!(", {frames} frames")),
+                false => (Picture::of(recording), String::new()),
+            };
+            let Picture { width, height, .. } = picture;
+            let bytes = if moves.is_empty() { picture.png() } else { picture.apng() };
+            let bytes = bytes.map_err(|error| Failure::new(Cause::Output, error))?;
+            let text = format!("{width} x {height} pixels{moves}");
+            let document = json!({ "width": width, "height": height });
+            written.push(Written::new("picture", path, &bytes, text, document)?);
         }
         Ok(written)
     }

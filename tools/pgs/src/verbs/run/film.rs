@@ -10,23 +10,29 @@ use pgs_command::options::solver::time_of;
 #[derive(Debug)]
 pub(super) struct Film {
     recording: Recording,
-    /// Steps from one frame to the next.
-    every: u32,
+    /// Frames of a step, at most one.
+    a_step: f64,
     time_step: f32,
 }
 
 impl Film {
     /// Begins with the scene at its start.
-    pub(super) fn new(scene: &Scene, every: u32, time_step: f32) -> Result<Self> {
+    pub(super) fn new(scene: &Scene, a_step: f64, time_step: f32) -> Result<Self> {
         let recording = Recording::new(scene.bodies(), scene.geometries());
-        let mut film = Self { recording, every, time_step };
+        let mut film = Self { recording, a_step, time_step };
         film.end(0, scene)?;
         Ok(film)
     }
 
     /// Adds the frame that may be due after `steps` steps.
     pub(super) fn step(&mut self, steps: u32, scene: &Scene) -> Result<()> {
-        if steps.is_multiple_of(self.every) { self.end(steps, scene) } else { Ok(()) }
+        // A share such as a third is no number of the machine's.
+        let frames = |steps: u32| (f64::from(steps) * self.a_step + 1e-6).floor();
+        if frames(steps) > frames(steps.saturating_sub(1)) {
+            self.end(steps, scene)
+        } else {
+            Ok(())
+        }
     }
 
     /// Adds the scene after `steps` steps, once.
@@ -59,12 +65,12 @@ mod tests {
 
     /// Films five steps; a cube falls by 1 m in each. Returns the steps, the time and the fall of
     /// every frame.
-    fn frames(every: u32) -> Vec<(u32, f32, f32)> {
+    fn frames(a_step: f64) -> Vec<(u32, f32, f32)> {
         let grid = "1x1x1".parse().expect("a grid");
         let options = SceneOptions { grid, ..SceneOptions::default() };
         let mut scene = Scene::new(&options).expect("a scene");
         let begin = scene.bodies()[1].pose.position[1];
-        let mut film = Film::new(&scene, every, TIME_STEP).expect("finite poses");
+        let mut film = Film::new(&scene, a_step, TIME_STEP).expect("finite poses");
         for step in 1..=5 {
             scene.bodies_mut()[1].pose.position[1] -= 1.0;
             film.step(step, &scene).expect("finite poses");
@@ -84,7 +90,11 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_steps_are_steps_and_the_last() {
-        assert_near(&frames(2), &[(0, 0.0), (2, 2.0), (4, 4.0), (5, 5.0)]);
+    fn frames_are_steps_and_the_last() {
+        assert_near(&frames(0.5), &[(0, 0.0), (2, 2.0), (4, 4.0), (5, 5.0)]);
+        assert_near(&frames(1.0 / 3.0), &[(0, 0.0), (3, 3.0), (5, 5.0)]);
+        // 24 of a second, of 60 steps.
+        assert_near(&frames(0.4), &[(0, 0.0), (3, 3.0), (5, 5.0)]);
+        assert_eq!(frames(2.0).len(), 6);
     }
 }

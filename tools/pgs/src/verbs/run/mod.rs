@@ -14,7 +14,10 @@ use clap::Args;
 use scene::{Scene, WarmStart};
 use serde_json::Value;
 use zynq_pgs::board::BoardKind;
+use zynq_pgs::emulation::Build;
 use zynq_pgs::{Capabilities, StepParameters, StepReport};
+#[cfg(feature = "live")]
+use zynq_pgs_view::live::Live;
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
@@ -23,22 +26,26 @@ use self::film::Film;
 use self::row::{Row, columns, step};
 use self::summary::Totals;
 use crate::bug_report::FaultArgs;
-use crate::footprint::Footprint;
 use crate::traced::{TraceFiles, TracedArgs, Tracing};
 use pgs_command::board::{self, OpenBoard};
 use pgs_command::common::{AcceleratorOptions, BoardOptions, CommonArgs};
 use pgs_command::failure::{Failure, Result, Verdict};
 use pgs_command::interrupt::Interrupt;
-use pgs_command::options::build::BuildArgs;
+use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::scenes::{ITERATIONS, STEPS, SceneArgs};
+#[cfg(feature = "live")]
+use pgs_command::options::solver::time_of;
 use pgs_command::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
 use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
+#[cfg(feature = "live")]
+use pgs_command::output::milliseconds;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
 use pgs_command::output::table::{Fixed, heading, line};
+use pgs_command::output::width::terminal;
 use step_folder::digest;
 
 const EXAMPLES: &str = "\
@@ -46,18 +53,19 @@ Examples:
   pgs run                                        the thesis' 38,880 cubes
   pgs run --contact-iterations 4 --friction-iterations 4 --drop 5     the thesis' passes (inferred)
   pgs run --grid 10x10x10 --steps 600 --report-every 30
-  pgs run --hazards unchecked --window 64        hardware that does not wait on hazards
-  pgs run --hazards unchecked --order as-given   the same in the thesis' order: piles gain energy
+  pgs run --board emulated:float,unchecked --order as-given     the thesis' design: piles gain energy
   pgs run --order hazard-free --verify
-  pgs run --profile half                          the thesis' design in sixteen bits
+  pgs run --board emulated:half                  the thesis' design in sixteen bits
   pgs run --scene shapes                         shapes of several masses, warm beside cold
   pgs run --scene shapes --warm-start=false --pair-friction=false     cold, with one friction
   pgs run --contact-iterations 4 --friction-iterations 4 --warm-start --grid 10x10x10 --steps 300
-  pgs run --bandwidth unlimited --json > run.json
+  pgs run --board emulated:float,bandwidth=unlimited --json > run.json
   pgs run --fault 'dma-dec-err@dma2.mm2s,phase=contact2,beat=17,step=5'
   pgs run --grid 4x4x4 --steps 60 --traced-step 30 --trace step.json --timeline step.svg
   pgs run --view pile.html --picture pile.png    a page that plays the run, and its last step
-  pgs run --poses pile.npz --every 4             the poses of every fourth step, for numpy
+  pgs run --scene shapes --steps 90 --picture pile.apng          a picture that moves
+  pgs run --live 8000                            a page that plays while the board steps
+  pgs run --poses pile.npz --fps 15              fifteen poses of a second, for numpy
   pgs run --retries 2 --report fault.json        repeat a failed step; save a report of the fault
 
 The grid, the cubes and the solver's constants are the thesis'. The drop is our choice, because the
@@ -68,7 +76,10 @@ Columns: step; pairs of bodies in contact; deepest penetration in the contacts g
 kinetic energy of the velocities that moved the bodies, which is 0 for a pile at rest; time of the
 step on the board, modelled for an emulated board; time of this machine. With --beside-cold the \
 depth
-and the energy of the same scene without a warm start and with one friction, stepped beside it.";
+and the energy of the same scene without a warm start and with one friction, stepped beside it.
+
+Ratio: the time of the same steps in software on a ZCU102's four Cortex-A53 cores, divided by
+that of board and driver; on paper, without the search for collisions (docs/worth.md).";
 
 /// The end of the short help.
 const MORE: &str = "`pgs run --help` has all options, by subject, and examples.";
@@ -80,12 +91,12 @@ const ROWS: u32 = 15;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = MORE, after_long_help = EXAMPLES)]
 pub(crate) struct RunArgs {
-    /// Steps to take [default: 120 for cubes, 600 for shapes]
+    /// Steps to take [default: 120 cubes, 600 shapes]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Show every N-th step [default: a fifteenth of the steps]
+    /// Show every N-th step [default: a fifteenth of all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     report_every: Option<u32>,
     #[command(flatten)]
@@ -95,6 +106,7 @@ pub(crate) struct RunArgs {
     /// With 0.85 of them, in one more pass of each kind [default: on for --scene shapes]
     #[arg(
         long,
+        hide_possible_values = true,
         value_name = "BOOL",
         help_heading = "Solver",
         num_args = 0..=1,
@@ -131,11 +143,11 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) board: BoardOptions,
     #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+    #[command(flatten)]
     pub(crate) accelerator: AcceleratorOptions,
     #[command(flatten)]
     faults: FaultArgs,
-    #[command(flatten)]
-    build: BuildArgs,
     #[command(flatten)]
     planned: PlannedArgs,
     #[command(flatten)]
@@ -156,7 +168,7 @@ impl RunArgs {
         let warm = self.warm_start.unwrap_or(shapes);
         let has_frictions = can.variant.has_pair_friction();
         let frictions = self.pair_friction.unwrap_or(shapes && has_frictions);
-        let parameters = StepParameters::default()
+        let parameters = StepParameters::thesis()
             .with_contact_iterations(ITERATIONS)
             .with_friction_iterations(ITERATIONS)
             .with_warm_start(warm)
@@ -193,11 +205,17 @@ impl RunArgs {
 
     /// The scene that is stepped beside this one, if one is. A planned fault names a step of the
     /// board by its number, and the steps of a second scene would shift the numbers.
-    fn beside(&self, parameters: &StepParameters, has_sensors: bool) -> Result<Option<Cold>> {
+    fn beside(
+        &self,
+        build: &Build,
+        parameters: &StepParameters,
+        has_sensors: bool,
+    ) -> Result<Option<Cold>> {
         let shown = !self.scene.is_cubes() && parameters.warm_start && !self.planned.is_given();
         let wanted = beside::is_stepped(self.beside_cold, shown, has_sensors);
-        let scene = || self.scene.build(&self.build.build());
-        wanted.then(|| scene().map(|scene| Cold::new(scene, parameters))).transpose()
+        wanted
+            .then(|| self.scene.build(build).map(|scene| Cold::new(scene, parameters)))
+            .transpose()
     }
 }
 
@@ -207,8 +225,6 @@ struct Course {
     done: u32,
     retries: u64,
     totals: Totals,
-    footprint: Footprint,
-    orders: order::OrdersSent,
     /// With `--json`, the document of every step.
     documents: Vec<Value>,
     last: Option<Row>,
@@ -218,6 +234,9 @@ struct Course {
     energy: Option<(String, Value)>,
     /// The poses for the files.
     film: Option<Film>,
+    /// The page that plays the run while it steps.
+    #[cfg(feature = "live")]
+    live: Option<Live>,
     /// Whether the files of the traced step were written.
     inside: TraceFiles,
 }
@@ -235,8 +254,8 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     args.files.check()?;
     let outputs = args.files.named().chain(args.traced.named()).chain(args.faults.named());
     Files::of(common).write(outputs).check()?;
-    let build = args.build.build();
-    let mut opened = board::open_as(common, &build, args.scene.config(&build))?;
+    let build = common.build();
+    let mut opened = board::open(common, args.scene.config(&build))?;
     args.scene.check_size(opened.accelerator.capabilities())?;
     let parameters = args.parameters(opened.accelerator.capabilities());
     let mut scene = args.scene.build(&build)?;
@@ -248,18 +267,30 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     let interrupt = Interrupt::install();
     opened.accelerator.set_cancellation(interrupt.cancellation());
     let sensors = energy::sensors(is_emulated(&opened));
-    let cold = args.beside(&parameters, sensors.is_some())?;
+    let cold = args.beside(&build, &parameters, sensors.is_some())?;
     let mut course = Course { cold, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
     course.film = args.files.film(&scene, args.steps(), parameters.time_step)?;
 
+    #[cfg(feature = "live")]
+    {
+        let facts = facts(args, &opened, &parameters);
+        course.live = args.files.live(&scene, &args.scene.text(), &facts)?;
+    }
     let meter = energy::start(sensors, course.cold.is_none());
     let scenes = (&mut scene, &mut course);
     let with = (&parameters, tracing.as_ref());
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
-    course.energy = energy::end(meter, course.done, course.totals.mean());
+    #[cfg(feature = "live")]
+    if let Some(live) = course.live.take() {
+        let time = time_of(course.done, parameters.time_step);
+        let mean = board_time(&opened, course.totals.mean());
+        let note = format!("{} steps, {mean} on average", course.done);
+        live.end((course.done, time), &note, scene.bodies());
+    }
+    course.energy = energy::end(meter, course.done);
     let complete = course.is_complete(args.steps());
-    let written = write_files(args, &opened, &scene, &mut course)?;
+    let written = write_files(args, &opened, &parameters, &scene, &mut course)?;
     if common.json {
         let mut document = document(args, &parameters, &opened, &mut scene, course);
         for file in written {
@@ -267,36 +298,60 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
         }
         writeln!(out, "{document:#}")?;
     } else {
-        print_end(args, &parameters, &opened, &mut scene, &mut course, out)?;
+        writeln!(out)?;
         for file in written {
             fact(out, file.label, &file.text)?;
         }
         args.traced.print(course.inside, out)?;
+        print_end(args, &opened, &mut scene, &course, out)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
 }
 
-/// Writes the files of the poses, and the picture.
+/// The facts of a run on its page.
+fn facts(
+    args: &RunArgs,
+    opened: &OpenBoard,
+    parameters: &StepParameters,
+) -> [(&'static str, String); 4] {
+    let StepParameters { contact_iterations, friction_iterations, warm_start, .. } = parameters;
+    let warm = if *warm_start { ", and one more of each for a warm start" } else { "" };
+    let profile = opened.accelerator.capabilities().variant.profile.name;
+    [
+        ("scene", args.scene.text()),
+        ("board", opened.accelerator.board().to_string()),
+        ("profile", profile.to_owned()),
+        (
+            "passes of a step",
+            format!(
+                "{contact_iterations} over contacts, {friction_iterations} over friction{warm}"
+            ),
+        ),
+    ]
+}
+
+/// The time of a step on the board, in words.
+fn board_time(opened: &OpenBoard, milliseconds: f64) -> String {
+    let modelled = if is_emulated(opened) { " (modelled)" } else { "" };
+    format!("{milliseconds:.3} ms a step on the board{modelled}")
+}
+
+/// Writes the files of the poses.
 fn write_files(
     args: &RunArgs,
     opened: &OpenBoard,
+    parameters: &StepParameters,
     scene: &Scene,
     course: &mut Course,
 ) -> Result<Vec<Written>> {
-    let mut written = Vec::new();
-    if let Some(film) = &mut course.film {
-        film.end(course.done, scene)?;
-        let digest = digest::of_bodies(scene.bodies());
-        let facts = [
-            ("scene", args.scene.text()),
-            ("board", opened.accelerator.board().to_string()),
-            ("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))),
-            ("digest", format!("{} {digest:016x}", digest::ALGORITHM)),
-        ];
-        written = args.files.write(film, &args.scene.text(), &facts)?;
-    }
-    written.extend(args.files.write_picture(scene)?);
-    Ok(written)
+    let Some(film) = &mut course.film else { return Ok(Vec::new()) };
+    film.end(course.done, scene)?;
+    let mut facts = facts(args, opened, parameters).to_vec();
+    let digest = digest::of_bodies(scene.bodies());
+    facts.push(("time", board_time(opened, course.totals.mean()) + " on average"));
+    facts.push(("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))));
+    facts.push(("digest", format!("{} {digest:016x}", digest::ALGORITHM)));
+    args.files.write(film, &args.scene.text(), &facts)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.
@@ -310,7 +365,6 @@ fn take_steps(
     out: &mut dyn Write,
 ) -> Result<()> {
     let progress = progress_bar(args.steps());
-    let variant = opened.accelerator.capabilities().variant;
     let mut warm = parameters.warm_start.then(WarmStart::default);
     while course.done < args.steps() && !interrupt.is_set() {
         let number = course.done + 1;
@@ -341,10 +395,15 @@ fn take_steps(
         if let Some(film) = &mut course.film {
             film.step(course.done, scene)?;
         }
+        #[cfg(feature = "live")]
+        if let Some(live) = &mut course.live {
+            let time = time_of(course.done, parameters.time_step);
+            let modelled = milliseconds(row.report.modelled_time());
+            let note = || format!("step {}, {}", course.done, board_time(opened, modelled));
+            live.show((course.done, time), note, scene.bodies());
+        }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
-        course.footprint.include(&variant, &row.report);
-        course.orders.count(row.report.order);
         if course.done == 1 && !common.json {
             // The heading waits for the first step: a refused scene prints only the refusal.
             let cold = course.cold.is_some();
@@ -369,10 +428,15 @@ fn take_steps(
     Ok(())
 }
 
-/// The columns of the default table.
+/// The columns of the default table, as many as fit the terminal.
 fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
-    let own = columns(is_emulated(opened));
-    own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold)).collect()
+    let (own, mut used) = (columns(is_emulated(opened)), 0);
+    let all = own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold));
+    let fits = |column: &Fixed| {
+        used += column.width + 1;
+        used <= terminal().saturating_add(1)
+    };
+    all.take_while(fits).collect()
 }
 
 /// Whether the times of the board are modelled.

@@ -6,7 +6,7 @@ use scene::{Scene, WarmStart};
 use serde_json::Value;
 use zynq_pgs::{Accelerator, StepParameters, StepReport};
 
-use crate::a53::HostTimes;
+use crate::a53::Paper;
 use pgs_command::board::is_cancelled;
 use pgs_command::numbers::grouped;
 use pgs_command::output::table::Fixed;
@@ -27,8 +27,8 @@ pub(super) struct Row {
     pub(super) before_gravity: f64,
     pub(super) detect: Duration,
     pub(super) report: StepReport,
-    /// The host's time on the processor of a ZCU102, if it is counted.
-    pub(super) a53: Option<HostTimes>,
+    /// The step on the processor of a ZCU102, if it is counted.
+    pub(super) a53: Option<Paper>,
 }
 
 /// The default columns. The times of an emulated board are modelled.
@@ -70,7 +70,7 @@ impl Row {
         value["deepest_penetration_m"] = self.deepest.into();
         value["kinetic_energy_j"] = self.kinetic_energy.into();
         value["kinetic_energy_before_gravity_j"] = self.before_gravity.into();
-        value["host_on_a53_ms"] = self.a53.map(HostTimes::to_json).into();
+        value["host_on_a53_ms"] = self.a53.map(Paper::to_json).into();
         value["host_ms"]["detect"] = milliseconds(self.detect).into();
         value
     }
@@ -120,7 +120,7 @@ pub(super) fn step(
         kinetic_energy,
         before_gravity: before_gravity.total(),
         detect,
-        a53: HostTimes::of(accelerator, &report, [parameters.warm_start, true]),
+        a53: Paper::of(accelerator, &report, [parameters.warm_start, true]),
         report,
     }))
 }

@@ -111,7 +111,7 @@ impl Measure for Options {
         let common = session.emulated();
         let mut start = Start::load(&self.start)?;
         let open = |start: &Start<'_>, build: &Build| {
-            start.open(build, self.start.scene.config(build), &common, session)
+            start.open(self.start.scene.config(build), &common, session)
         };
         let original: Build = ORIGINAL.parse().map_err(Failure::input)?;
         let mut boards = vec![open(&start, &original)?];

@@ -10,7 +10,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use scene::Grid;
-use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
 use zynq_pgs::{Impulses, StepParameters};
 
@@ -194,13 +193,13 @@ impl Course<'_> {
 impl Measure for Options {
     /// Takes the step with each number of passes.
     fn measure(&self, session: &Session) -> Result<Part> {
-        let mut opened = board::open(&session.common, &Build::default())?.stated();
+        let mut opened = board::open(&session.common, session.common.build().config())?.stated();
         let (name, step) = match &self.input {
             Some(path) => (path.display().to_string(), Some(GivenStep::folder(path)?)),
             None => {
                 let Options { grid, drop, steps, .. } = *self;
                 scenes::check_size(grid, opened.accelerator.capabilities())?;
-                let (scene, parameters) = (pile::build(grid, drop)?, StepParameters::default());
+                let (scene, parameters) = (pile::build(grid, drop)?, StepParameters::thesis());
                 let parameters = self.solver.apply(parameters);
                 let step = GivenStep::after(steps, scene, &mut opened, parameters, session)?;
                 (format!("step {} of {grid} cubes dropped from {drop} m", steps + 1), step)

@@ -247,7 +247,7 @@ mod tests {
         let contact = Contact { point: [0.0; 3], distance: -0.005 };
         let contacts = [contact, Contact::default(), Contact::default(), Contact::default()];
         let pair = Collision { body_a: 0, body_b: 1, normal: [0.0, -1.0, 0.0], count: 1, contacts };
-        let problem = Problem::new(&bodies, &shapes, &[pair], &StepParameters::default());
+        let problem = Problem::new(&bodies, &shapes, &[pair], &StepParameters::thesis());
         (bodies, problem)
     }
 

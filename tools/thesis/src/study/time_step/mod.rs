@@ -8,7 +8,6 @@ mod show;
 
 use clap::Args;
 use scene::{Grid, Scene, SceneOptions};
-use zynq_pgs::emulation::Build;
 use zynq_pgs::{Body, Pose, StepParameters, Velocity};
 
 use crate::experiment::{Boards, Experiment, Measure, Part};
@@ -119,7 +118,7 @@ impl Measure for Options {
     /// Takes the steps of every length.
     fn measure(&self, session: &Session) -> Result<Part> {
         scenes::check_rows(self.grid)?;
-        let mut opened = board::open(&session.common, &Build::default())?.stated();
+        let mut opened = board::open(&session.common, session.common.build().config())?.stated();
         session.watch(&mut opened);
         let scene = scene(self)?;
         opened.accelerator.set_shapes(scene.shapes()).map_err(|error| opened.failure(error))?;
@@ -128,7 +127,7 @@ impl Measure for Options {
         let mut rows: Vec<Row> = Vec::new();
         let mut shortest = None;
         for rate in RATES {
-            let parameters = StepParameters::default()
+            let parameters = StepParameters::thesis()
                 .with_contact_iterations(self.iterations)
                 .with_friction_iterations(self.iterations)
                 .with_time_step(1.0 / f32::from(rate));
