@@ -61,7 +61,7 @@ circuit() {
 	mkdir "$folder"
 	bound "$module" "$(file_of "$module")" > "$folder/$module.sv"
 	for part in $parts; do files+=" $(file_of "$part")"; done
-	attend timeout 120 yosys -q -p "
+	attend timeout 600 yosys -q -p "
 		read_verilog ${cuts:+-D CUT} -formal -sv -I $work/verilog $folder/$module.sv $files $properties/*.sv
 		${parameters:+chparam $(printf -- ' -set %s' $parameters | tr = ' ') $module}
 		hierarchy -check -top $module
@@ -207,7 +207,7 @@ check pgs_queue "$by" \
 	'not_held & ~renewed' 'not_held' \
 	'& ~holds & ~blocked)' '& ~holds)' \
 	"PATIENCE[10:0] - 11'd1)" "PATIENCE[10:0] - 11'd2)" \
-	'((held | renewed) & ~over)' '(held & ~over)' \
+	'(held | renewed) & ~over)' 'held & ~over)' \
 	'(free_at == slot_after)' "(free_at == slot_after + 8'd1)" \
 	'(enters ? behind' "(1'b0 ? behind" \
 	'& ~owed & has_room' '& ~owed' \
