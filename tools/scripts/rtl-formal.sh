@@ -191,7 +191,7 @@ check pgs_receiver 'scorr; pdr -F 22' \
 parts='pgs_queue_first pgs_queue_hazard pgs_queue_records pgs_fifo'
 parameters='DEPTH=2 SLOTS=4 SLOT=3 BODY=1 COLLISION=2 WINDOW=5 PATIENCE=3 FACTS=6'
 check pgs_queue 'scorr; bmc3 -F 22' \
-	'pop(take & none_fresh)' 'pop(take)' \
+	'loads        <= phase & some_loading' 'loads        <= some_loading' \
 	'slot_rest    <= slot;' 'slot_rest    <= loading;' \
 	'{waiting, some} <= {waiting - 1' '{waiting, some} <= {waiting - 2' \
 	'early_has_b ? early_use :' "1'b0 ? early_use :" \
