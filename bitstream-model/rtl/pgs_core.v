@@ -283,7 +283,7 @@ module pgs_core (
       wire [FACTS-1:0] facts;
       pgs_queue #(
         .DEPTH(QUEUE_DEPTH), .SLOTS(QUEUE_SLOTS), .SLOT(QUEUE_SLOT_BITS), .BODY(BODY), .COLLISION(COLLISION),
-        .WINDOW(QUEUE_WINDOW), .FACTS(FACTS)
+        .WINDOW(QUEUE_WINDOW), .PATIENCE(QUEUE_PATIENCE * QUEUE_WINDOW), .FACTS(FACTS)
       ) waiting (
         .clk(clk), .clear(clear), .phase(phase), .passing(passing & queued), .parity(parity),
         .collisions(collisions),

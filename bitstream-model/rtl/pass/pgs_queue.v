@@ -21,6 +21,7 @@ module pgs_queue #(
   parameter integer BODY      = 16,
   parameter integer COLLISION = 17,
   parameter integer WINDOW    = 162,                   // slots; at most 255
+  parameter integer PATIENCE  = 648,                   // slots; at most 2047
   parameter integer FACTS     = 181
 ) (
   input  wire                 clk,
@@ -68,9 +69,6 @@ module pgs_queue #(
   input  wire                 body_moves_b,
   output wire [COLLISION:0]   use_of_body
 );
-`include "pgs_interface.vh"
-
-  localparam [10:0] PATIENCE = QUEUE_PATIENCE[10:0] * WINDOW[10:0];
   localparam integer COMING  = SLOTS - DEPTH;
 
   // ---- Collisions that come, and records
@@ -157,10 +155,10 @@ module pgs_queue #(
   wire [DEPTH-1:0] free  = not_held & ~renewed[DEPTH-1:0];
   wire [DEPTH:0]   asked = phase ? {1'b0, free} : {1'b1, occupied[DEPTH-1:0] & ~pick};
   wire [DEPTH:0]   from_first, first_of;
-  wire [WIDTH*(DEPTH+1)-1:0] records_of;       // where the record of a place is, and its bodies
+  wire [WIDTH*(SLOTS+1)-1:0] in;     // where the record of a place is, and its bodies; last, of the one that comes
   wire [WIDTH-1:0] first_record;
   pgs_queue_first #(.PLACES(DEPTH + 1), .WIDTH(WIDTH)) of_the_places (
-    .asked(asked), .records(records_of), .from(from_first), .first(first_of), .record(first_record)
+    .asked(asked), .records(in[WIDTH*(DEPTH+1)-1:0]), .from(from_first), .first(first_of), .record(first_record)
   );
 
   // ---- Places
@@ -186,7 +184,7 @@ module pgs_queue #(
 
   reg  [10:0] patience;              // slots in which the oldest one did not issue
   reg         out_of_patience, oldest_goes;
-  wire        blocks = ~oldest_goes & (out_of_patience | (decides & (patience == PATIENCE - 11'd1)));
+  wire        blocks = ~oldest_goes & (out_of_patience | (decides & (patience == PATIENCE[10:0] - 11'd1)));
   wire [SLOTS-1:0] blocked = {{(COMING-1){1'b0}}, common} & {SLOTS{blocks}};
   wire [SLOTS-1:0] stays   = occupied & {{COMING{1'b1}}, ~pick};
   wire [SLOTS-1:0] frees   = moved(moves, stays & ~holds & ~blocked);
@@ -222,10 +220,10 @@ module pgs_queue #(
     end
   end
 
-  wire [WIDTH-1:0] in [0:SLOTS];
-  wire [7:0]       in_free_at [0:SLOTS];
-  assign in[SLOTS]       = {slot_s3, a_s3, b_s3, moves_a_s3, moves_b_s3};
-  assign in_free_at[SLOTS] = free_at_s5;
+  wire [8*(SLOTS+1)-1:0] in_free_at;
+  assign in[WIDTH*SLOTS +: WIDTH]  = {slot_s3, a_s3, b_s3, moves_a_s3, moves_b_s3};
+  assign in_free_at[8*SLOTS +: 8] = free_at_s5;
+  wire unused_free_at = &{1'b0, in_free_at[7:0]};
   genvar i;
   generate
     for (i = 0; i < SLOTS; i = i + 1) begin : g_place
@@ -234,20 +232,17 @@ module pgs_queue #(
       reg            moves_a, moves_b;
       reg [7:0]      free_at;
       wire           comes = (i >= DEPTH) & place[(i >= DEPTH) ? i - DEPTH : 0];
-      assign in[i]       = {slot, a, b, moves_a, moves_b};
-      assign in_free_at[i] = told[i] ? free_at_s5 : free_at;
-      if (i <= DEPTH) begin : g_record
-        assign records_of[WIDTH*i +: WIDTH] = in[i];
-      end
+      assign in[WIDTH*i +: WIDTH]  = {slot, a, b, moves_a, moves_b};
+      assign in_free_at[8*i +: 8] = told[i] ? free_at_s5 : free_at;
       assign over[i]  = passes_slot & (free_at == slot_after);
       assign meets[i] = (asked_moves_a & ((moves_a & (a == asked_a)) | (moves_b & (b == asked_a))))
                       | (asked_moves_b & ((moves_a & (a == asked_b)) | (moves_b & (b == asked_b))));
       always @(posedge clk) begin
-        if (comes) {slot, a, b, moves_a, moves_b} <= in[SLOTS];
-        else if (moves[i]) {slot, a, b, moves_a, moves_b} <= in[i+1];
+        if (comes) {slot, a, b, moves_a, moves_b} <= in[WIDTH*SLOTS +: WIDTH];
+        else if (moves[i]) {slot, a, b, moves_a, moves_b} <= in[WIDTH*(i+1) +: WIDTH];
         if (phase) begin
           if (renewed[i]) free_at <= issue_free_at;
-        end else if (moves[i]) free_at <= in_free_at[i+1];
+        end else if (moves[i]) free_at <= in_free_at[8*(i+1) +: 8];
         else if (told[i]) free_at <= free_at_s5;
       end
     end
