@@ -97,6 +97,17 @@ pub enum ViewError {
         /// The most in all.
         pixels: u32,
     },
+    /// The camera of a picture.
+    #[error(
+        "expected a camera at finite places, found its eye at {eye:?} and its target at \
+         {target:?}: give it finite ones, or record fewer steps"
+    )]
+    Camera {
+        /// The eye, m.
+        eye: [f32; 3],
+        /// Its target, m.
+        target: [f32; 3],
+    },
     /// The page of a run cannot be served.
     #[error("the page of the run cannot be served at {address}: give a free port of this machine")]
     Live {

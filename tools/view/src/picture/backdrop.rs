@@ -49,7 +49,9 @@ pub(super) fn backdrop(view: &View, width: u16, height: u16) -> Vec<[f32; 3]> {
 /// The share of a pixel that a line covers whose middle is `away` from that of the pixel.
 fn covered(away: f32, thickness: f32, pixel: f32) -> f32 {
     let most = if thickness < pixel { thickness } else { pixel };
-    (0.5 * (thickness + pixel) - away).clamp(0.0, most) / pixel
+    let across = 0.5 * (thickness + pixel) - away;
+    let across = if across > most { most } else { across };
+    if across > 0.0 { across / pixel } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -95,9 +95,12 @@ impl<'a> Picture<'a> {
         Self { recording, camera: Camera::around(poses, radius, aspect), width, height }
     }
 
-    /// Refuses a picture without pixels, or with too many.
+    /// Refuses a picture without pixels, with too many, or from a place that is not finite.
     fn check(&self) -> Result<(), ViewError> {
-        let Self { width, height, .. } = *self;
+        let Self { width, height, camera: Camera { eye, target }, .. } = *self;
+        if !eye.iter().chain(&target).all(|value| value.is_finite()) {
+            return Err(ViewError::Camera { eye, target });
+        }
         let sides = [width, height].iter().all(|length| (1..=SIDE_MOST).contains(length));
         if sides && u32::from(width) * u32::from(height) <= PIXELS_MOST {
             return Ok(());
@@ -108,7 +111,8 @@ impl<'a> Picture<'a> {
     /// The last frame as PNG.
     ///
     /// # Errors
-    /// [`ViewError`]: the picture has no pixels or too many, or a geometry has no surface.
+    /// [`ViewError`]: the picture has no pixels or too many, its camera is not finite, or a geometry
+    /// has no surface.
     pub fn png(&self) -> Result<Vec<u8>, ViewError> {
         let pixels = self.pixels(&self.stage()?, self.recording.frames().last(), None);
         let mut bytes = Vec::new();
@@ -208,8 +212,10 @@ fn colour(raster: &Raster, backdrop: &[[f32; 3]], x: usize, y: usize) -> [f32; 3
 mod tests {
     use super::*;
     use crate::recording::fixture;
+    use scene::Geometry;
     use std::collections::BTreeSet;
     use std::io::Cursor;
+    use zynq_pgs::{Body, Pose, Velocity};
 
     #[test]
     fn the_decoded_png_is_the_picture_and_shows_bodies_before_ground_and_sky() {
@@ -257,6 +263,37 @@ mod tests {
             for found in [picture.png(), picture.apng()] {
                 let said = found.expect_err("no picture").to_string();
                 assert!(said.ends_with(&format!("found {width} by {height}")), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_that_is_not_finite_is_refused() {
+        let recording = fixture(1);
+        let picture = Picture { width: 15, height: 9, ..Picture::of(&recording) };
+        let camera = picture.camera;
+        for camera in [
+            Camera { eye: [f32::NAN, 1.0, 0.0], ..camera },
+            Camera { target: [0.0, f32::NEG_INFINITY, 0.0], ..camera },
+        ] {
+            let refused = Picture { camera, ..picture }.png();
+            assert!(matches!(refused, Err(ViewError::Camera { .. })), "{refused:?}");
+        }
+    }
+
+    #[test]
+    fn a_body_however_far_away_becomes_a_picture_or_a_refusal() {
+        for power in 0..39_u8 {
+            let far = libm::powf(10.0, power.into());
+            for position in [[far, 0.0, 0.0], [0.0, far, 0.0], [far; 3], [-far, far, 1.0]] {
+                let pose = Pose { position, orientation: [0.0, 0.0, 0.0, 1.0] };
+                let bodies = [Body { pose, velocity: Velocity::default(), shape: 0 }];
+                let mut recording = Recording::new(&bodies, &[Some(Geometry::CUBE)]);
+                recording.add(0, 0.0, &bodies).expect("a finite pose");
+                let picture = Picture { width: 15, height: 9, ..Picture::of(&recording) };
+                let drawn = picture.png();
+                let is_refused = matches!(drawn, Err(ViewError::Camera { .. }));
+                assert!(drawn.is_ok() || is_refused, "{position:?}");
             }
         }
     }
