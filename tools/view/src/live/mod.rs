@@ -15,7 +15,7 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -43,6 +43,8 @@ struct Limits {
     interval: Duration,
     /// Frames that wait for a reader.
     waiting: usize,
+    /// Time from an error of the listener to its next try.
+    pause: Duration,
 }
 
 const LIMITS: Limits = Limits {
@@ -51,6 +53,7 @@ const LIMITS: Limits = Limits {
     write: Duration::from_secs(2),
     interval: Duration::from_millis(33),
     waiting: 4,
+    pause: Duration::from_millis(100),
 };
 
 /// An event for all readers.
@@ -65,6 +68,8 @@ struct Hub {
     is_closed: AtomicBool,
     connections: AtomicUsize,
     readers: Mutex<Vec<Reader>>,
+    /// The frame of the end, for readers that no longer get another.
+    last: OnceLock<Event>,
 }
 
 /// A reader of frames.
@@ -128,9 +133,10 @@ impl Live {
             is_closed: AtomicBool::new(false),
             connections: AtomicUsize::new(0),
             readers: Mutex::default(),
+            last: OnceLock::new(),
         });
         let shared = Arc::clone(&hub);
-        let accept = move || accept(&listener, &shared);
+        let accept = move || accept(listener.incoming(), &shared);
         let listener = thread::Builder::new().name("live".to_owned()).spawn(accept);
         let listener = Some(listener.map_err(unserved)?);
         Ok(Self { address, hub, recording: start.clone(), sent: None, listener })
@@ -159,20 +165,20 @@ impl Live {
         });
     }
 
-    /// Shows the bodies at the end, and closes; waits for readers as long as one may take for a
-    /// frame.
+    /// Shows the bodies at the end, and closes; waits for all readers together as long as one may
+    /// take for two frames, the one that it is at and the last.
     pub fn end(mut self, at: (u32, f32), note: &str, bodies: &[Body]) {
         let readers = std::mem::take(&mut *self.hub.readers());
         if readers.is_empty() {
             return;
         }
         let Some(event) = self.event(at, note, bodies, true) else { return };
-        let most = self.hub.limits.write * 2;
-        for Reader { events, gone } in readers {
-            // The thread behind the channel takes its frames in time, or ends.
-            let _gone = events.send(Arc::clone(&event));
-            drop(events);
-            let _gone = gone.recv_timeout(most);
+        self.hub.last.get_or_init(|| event);
+        let deadline = Instant::now() + self.hub.limits.write * 2;
+        // Without its channel a thread ends behind the last frame.
+        let gone: Vec<_> = readers.into_iter().map(|reader| reader.gone).collect();
+        for gone in gone {
+            let _gone = gone.recv_timeout(deadline.saturating_duration_since(Instant::now()));
         }
     }
 
@@ -197,6 +203,9 @@ impl Drop for Live {
     fn drop(&mut self) {
         self.hub.is_closed.store(true, Ordering::Release);
         self.hub.readers().clear();
+        if let Some(listener) = &self.listener {
+            listener.thread().unpark();
+        }
         // A connection wakes the listener; an address of all interfaces takes it, too.
         if TcpStream::connect_timeout(&self.address, LIMITS.write).is_ok()
             && let Some(listener) = self.listener.take()
@@ -213,24 +222,25 @@ fn token() -> io::Result<String> {
     Ok(bytes.map(|byte| format!("{byte:02x}")).concat())
 }
 
-/// Errors of the listener in a row before it gives up.
-const ERRORS_MOST: u32 = 100;
-
 /// Takes connections until the run closes. Each has a thread of its own.
-fn accept(listener: &TcpListener, hub: &Arc<Hub>) {
-    let mut errors = 0;
-    for stream in listener.incoming() {
+fn accept(connections: impl Iterator<Item = io::Result<TcpStream>>, hub: &Arc<Hub>) {
+    let mut is_told = false;
+    for stream in connections {
         if hub.is_closed.load(Ordering::Acquire) {
             return;
         }
-        let Ok(stream) = stream else {
-            errors += 1;
-            if errors == ERRORS_MOST {
-                return;
+        let stream = match stream {
+            Ok(stream) => stream,
+            Err(error) => {
+                if !is_told {
+                    log::warn!("the page of the run takes no reader for now: {error}");
+                }
+                is_told = true;
+                // The system may lack files for a while, and says so at once: no busy loop.
+                thread::park_timeout(hub.limits.pause);
+                continue;
             }
-            continue;
         };
-        errors = 0;
         let place = Place::take(hub);
         let Some(place) = place else {
             let deadline = Instant::now() + hub.limits.write;
@@ -287,7 +297,10 @@ fn serve(stream: &TcpStream, hub: &Hub) -> io::Result<()> {
             if hub.is_closed.load(Ordering::Acquire) {
                 hub.readers().clear();
             }
-            events.iter().try_for_each(|event: Event| send(&event))
+            // The last frame goes before the ones that still wait.
+            let mut waiting = events.iter().take_while(|_| hub.last.get().is_none());
+            waiting.try_for_each(|event: Event| send(&event))?;
+            hub.last.get().map_or(Ok(()), |event| send(event))
         }
     }
 }

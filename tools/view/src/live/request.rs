@@ -5,10 +5,13 @@
 //! of its own. `Host` must therefore be the address that the connection has come to, `Origin`, which
 //! a browser adds for a foreign page, the same, and the path must begin with the token.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 
 /// Most fields of a request's head.
 const FIELDS_MOST: usize = 64;
+
+/// The port that browsers leave out of `Host` and `Origin`.
+const HTTP: u16 = 80;
 
 /// A request without a body.
 #[derive(Debug)]
@@ -45,13 +48,10 @@ impl Request {
 
     /// Decides about a request that has come to a local address.
     pub(super) fn answer(&self, local: SocketAddr, token: &str) -> Answer {
-        let name = format!("localhost:{}", local.port());
-        let own = [local.to_string()].into_iter().chain(local.ip().is_loopback().then_some(name));
-        let mut own = own.map(String::into_bytes);
         let [host] = self.hosts.as_slice() else {
             return Answer::Refused(400, "expected one Host");
         };
-        if !own.any(|known| known == *host) {
+        if !is_own(host, local) {
             return Answer::Refused(403, "expected the address of this server as Host");
         }
         let origin = [b"http://", host.as_slice()].concat();
@@ -72,6 +72,20 @@ impl Request {
             _ => Answer::Refused(404, "expected the page, or its frames"),
         }
     }
+}
+
+/// Whether a field names a local address, in any text of it, or `localhost` for a loopback.
+fn is_own(host: &[u8], local: SocketAddr) -> bool {
+    let Ok(host) = str::from_utf8(host) else { return false };
+    let name = match host.strip_suffix(&format!(":{}", local.port())) {
+        Some(name) => name,
+        None if local.port() == HTTP => host,
+        None => return false,
+    };
+    let known = local.ip().to_canonical();
+    let bare = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+    let is_known = bare.parse().is_ok_and(|found: IpAddr| found.to_canonical() == known);
+    is_known || known.is_loopback() && name == "localhost"
 }
 
 /// Compares texts in a time that does not tell where they differ.
@@ -107,7 +121,7 @@ mod tests {
     use super::*;
 
     fn answer(head: &str) -> Answer {
-        let local = "127.0.0.1:80".parse().expect("an address");
+        let local = "127.0.0.1:8000".parse().expect("an address");
         let request = Request::parse(head.replace('\n', "\r\n").as_bytes()).expect("a request");
         request.answer(local, "secret")
     }
@@ -121,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_page_and_its_frames_have_their_own_address_only() {
-        let with = |path: &str| answer(&format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:80\n\n"));
+        let with = |path: &str| answer(&format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:8000\n\n"));
         assert_eq!(with("/secret/"), Answer::Page);
         assert_eq!(with("/secret/frames"), Answer::Frames);
         for path in ["/", "/secret", "/secre/", "/secrets/", "/Secret/", "//secret/", "/secret/x"] {
@@ -132,29 +146,55 @@ mod tests {
     #[test]
     fn another_host_origin_or_method_is_refused() {
         let with = |lines: &str| code(&format!("GET /secret/frames HTTP/1.1\n{lines}\n\n"));
-        assert_eq!(with("Host: localhost:80\nOrigin: http://localhost:80"), 200);
-        assert_eq!(with("host: 127.0.0.1:80\norigin: http://127.0.0.1:80"), 200);
+        assert_eq!(with("Host: localhost:8000\nOrigin: http://localhost:8000"), 200);
+        assert_eq!(with("host: 127.0.0.1:8000\norigin: http://127.0.0.1:8000"), 200);
         assert_eq!(with("Accept: */*"), 400);
-        assert_eq!(with("Host: 127.0.0.1:80\nHost: 127.0.0.1:80"), 400);
-        for host in ["evil.example:80", "127.0.0.1", "127.0.0.1:81", "127.0.0.2:80", ""] {
+        assert_eq!(with("Host: 127.0.0.1:8000\nHost: 127.0.0.1:8000"), 400);
+        for host in ["evil.example:8000", "127.0.0.1", "127.0.0.1:800001", "127.0.0.2:8000", ""] {
             assert_eq!(with(&format!("Host: {host}")), 403, "{host}");
         }
-        for origin in ["http://evil.example", "null", "https://127.0.0.1:80", "http://localhost:80"]
+        for origin in
+            ["http://evil.example", "null", "https://127.0.0.1:8000", "http://localhost:8000"]
         {
-            assert_eq!(with(&format!("Host: 127.0.0.1:80\nOrigin: {origin}")), 403, "{origin}");
+            assert_eq!(with(&format!("Host: 127.0.0.1:8000\nOrigin: {origin}")), 403, "{origin}");
         }
-        assert_eq!(code("POST /secret/ HTTP/1.1\nHost: 127.0.0.1:80\n\n"), 405);
+        assert_eq!(code("POST /secret/ HTTP/1.1\nHost: 127.0.0.1:8000\n\n"), 405);
         assert!(Request::parse(b"nonsense\r\n\r\n").is_none());
+    }
+
+    fn at(local: &str, lines: &str) -> Answer {
+        let head = format!("GET /secret/ HTTP/1.1\r\n{lines}\r\n\r\n");
+        let request = Request::parse(head.as_bytes()).expect("a request");
+        request.answer(local.parse().expect("an address"), "secret")
     }
 
     #[test]
     fn an_address_of_the_network_is_no_localhost() {
-        let local = "192.0.2.7:80".parse().expect("an address");
-        let answer = |host: &str| {
-            let head = format!("GET /secret/ HTTP/1.1\r\nHost: {host}\r\n\r\n");
-            Request::parse(head.as_bytes()).expect("a request").answer(local, "secret")
-        };
-        assert_eq!(answer("192.0.2.7:80"), Answer::Page);
-        assert!(matches!(answer("localhost:80"), Answer::Refused(403, _)));
+        assert_eq!(at("192.0.2.7:8000", "Host: 192.0.2.7:8000"), Answer::Page);
+        let refused = at("192.0.2.7:8000", "Host: localhost:8000");
+        assert!(matches!(refused, Answer::Refused(403, _)));
+    }
+
+    #[test]
+    fn the_port_of_http_may_be_left_out() {
+        for host in ["127.0.0.1", "127.0.0.1:80", "localhost", "localhost:80"] {
+            let lines = format!("Host: {host}\r\nOrigin: http://{host}");
+            assert_eq!(at("127.0.0.1:80", &lines), Answer::Page, "{host}");
+        }
+        for lines in ["Host: evil.example", "Host: 127.0.0.1:8000", "Host: 127.0.0.1:"] {
+            assert!(matches!(at("127.0.0.1:80", lines), Answer::Refused(403, _)), "{lines}");
+        }
+        assert_eq!(at("[::1]:80", "Host: [::1]"), Answer::Page);
+    }
+
+    /// Browsers write the last 32 bits of an address in hexadecimal.
+    #[test]
+    fn an_address_of_version_4_within_version_6_is_known_in_every_text() {
+        let local = "[::ffff:127.0.0.1]:8000";
+        for host in ["[::ffff:127.0.0.1]:8000", "[::ffff:7f00:1]:8000", "localhost:8000"] {
+            assert_eq!(at(local, &format!("Host: {host}")), Answer::Page, "{host}");
+        }
+        let refused = at(local, "Host: [::ffff:7f00:2]:8000");
+        assert!(matches!(refused, Answer::Refused(403, _)));
     }
 }

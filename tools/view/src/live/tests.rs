@@ -133,7 +133,7 @@ fn a_connection_that_asks_for_nothing_is_closed_in_time() {
 
 /// The slow reader takes nothing: its frames fill the buffers of the system, then the channel.
 #[test]
-fn a_slow_reader_is_dropped_and_neither_the_run_nor_the_other_reader_waits() {
+fn a_slow_reader_is_dropped_and_the_other_one_gets_each_frame() {
     let limits = Limits { write: Duration::from_millis(300), ..unpaced() };
     let (mut live, bodies) = live(limits);
     let slow = reader(&live);
@@ -152,22 +152,55 @@ fn a_slow_reader_is_dropped_and_neither_the_run_nor_the_other_reader_waits() {
     // A long note makes few frames fill the buffers.
     let note = "x".repeat(1 << 20);
     let begin = Instant::now();
-    let mut longest = Duration::ZERO;
     let mut step = 0;
     while live.hub.readers().len() > 1 {
         assert!(begin.elapsed() < MOST, "the slow reader is still there after {step} frames");
-        let show = Instant::now();
         step += 1;
         live.show((step, 0.1), || note.clone(), &bodies);
-        longest = longest.max(show.elapsed());
         // The good reader sets the pace.
         frames.recv_timeout(MOST).expect("the other reader gets each frame");
     }
-    assert!(longest < limits.write, "no frame waits for a reader: {longest:?}");
     drop(slow);
     drop(frames);
     live.end((step, 0.1), "", &bodies);
     other.join().expect("it ends");
+}
+
+/// Their threads neither take a frame nor end.
+#[test]
+fn readers_without_room_hold_up_no_frame_and_the_end_waits_once_for_all() {
+    const READERS: u32 = 200;
+    let limits = Limits { write: Duration::from_millis(100), ..unpaced() };
+    let (mut live, bodies) = live(limits);
+    let mut held = Vec::new();
+    for _ in 0..READERS {
+        let ((events, frames), (here, gone)) = (mpsc::sync_channel(0), channel());
+        held.push((frames, here));
+        live.hub.readers().push(Reader { events, gone });
+    }
+    let (done, ended) = channel();
+    let run = thread::spawn(move || {
+        live.show((1, 0.1), String::new, &bodies);
+        live.end((2, 0.2), "", &bodies);
+        done.send(()).expect("the test waits");
+    });
+    let one_by_one = limits.write * READERS;
+    ended.recv_timeout(one_by_one).expect("one time for all readers");
+    run.join().expect("it ends");
+}
+
+#[test]
+fn errors_of_the_listener_do_not_end_it() {
+    let (live, _) = live(Limits { pause: Duration::ZERO, ..LIMITS });
+    let other = TcpListener::bind(LOOPBACK).expect("a free port");
+    let address = other.local_addr().expect("its address");
+    let mut stream = TcpStream::connect(address).expect("a connection");
+    let token = &live.hub.token;
+    let head = format!("GET /{token}/ HTTP/1.1\r\nHost: {address}\r\n\r\n");
+    stream.write_all(head.as_bytes()).expect("sent");
+    let errors = (0..1000).map(|_| Err(io::ErrorKind::QuotaExceeded.into()));
+    accept(errors.chain([Ok(other.accept().expect("it is there").0)]), &live.hub);
+    assert_eq!(line(&mut BufReader::new(stream)), "HTTP/1.1 200 200");
 }
 
 #[test]
@@ -180,8 +213,9 @@ fn without_a_reader_no_frame_is_encoded_and_with_one_not_too_many() {
     let begin = Instant::now();
     (2..1000).for_each(|step| live.show((step, 0.1), String::new, &bodies));
     let most = begin.elapsed().as_millis() / LIMITS.interval.as_millis() + 1;
+    assert_eq!(frame(&mut reader)["ended"], false);
+    let mut count = 1;
     live.end((1000, 0.2), "", &bodies);
-    let mut count = 0;
     while frame(&mut reader)["ended"] == false {
         count += 1;
     }

@@ -119,7 +119,7 @@ void main() {
 
 // Floats of a body in the texture: position and colour, quaternion.
 const FLOATS = 8;
-// From so many bodies on, only bodies whose centre is not higher than some radii cast a shadow: a
+// From this number of bodies on, only bodies whose centre is not higher than some radii cast a shadow: a
 // software renderer takes as long for the shadows of all as for the bodies.
 const MANY = 4096;
 const CONTACT = 2.5;
