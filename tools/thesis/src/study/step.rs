@@ -208,7 +208,7 @@ impl Options {
 }
 
 impl Side {
-    /// Takes the step, and of a scene those behind it; none if Ctrl-C ended them.
+    /// Takes the step, and of a scene the steps behind it; none if Ctrl-C ended them.
     fn run(
         &self,
         start: &World,
