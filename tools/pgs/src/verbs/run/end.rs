@@ -6,8 +6,9 @@ use scene::Scene;
 use serde_json::{Value, json};
 use zynq_pgs::StepParameters;
 
+use super::facts::is_emulated;
 use super::summary::Summary;
-use super::{Course, RunArgs, is_emulated};
+use super::{Course, RunArgs};
 use pgs_command::board::OpenBoard;
 use pgs_command::numbers::grouped;
 use pgs_command::options::solver::time_step_text;

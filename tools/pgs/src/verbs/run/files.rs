@@ -1,24 +1,26 @@
 //! The files of a run's poses: arrays, a page and a picture.
 
 use std::io::Write as _;
-#[cfg(feature = "live")]
-use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use scene::Scene;
 use serde_json::{Value, json};
+use step_folder::digest;
 use step_folder::replace::replace;
 use thiserror::Error;
+use zynq_pgs::StepParameters;
 use zynq_pgs_view::page::page;
 use zynq_pgs_view::picture::Picture;
-#[cfg(feature = "live")]
-use zynq_pgs_view::{Recording, live::Live};
 use zynq_pgs_view::{ViewError, npz};
 
+use super::facts::{board_time, facts};
 use super::film::Film;
+use super::{Course, RunArgs};
+use pgs_command::board::OpenBoard;
 use pgs_command::failure::{Cause, Failure, Result};
 use pgs_command::numbers::grouped;
+use pgs_command::options::solver::time_step_text;
 use pgs_command::output::files::{Named, check_folder, unwritten};
 
 /// Most frames without a choice of the user's, beside the start.
@@ -54,13 +56,9 @@ pub(crate) struct FileArgs {
         value_parser = |text: &str| with_extension(text, &["png", "apng"])
     )]
     picture: Option<PathBuf>,
-    /// Serve a page that plays the run while the board steps, on this machine, or at an ADDRESS of
-    /// its network
-    ///
-    /// The command prints the address of the page, which has a random token.
     #[cfg(feature = "live")]
-    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = loopback_or)]
-    live: Option<SocketAddr>,
+    #[command(flatten)]
+    pub(super) live: super::live::LiveArgs,
     /// Frames of a simulated second, a step each [default: about 200 of the run]
     #[arg(long, value_name = "N", value_parser = frames_per_second)]
     fps: Option<f32>,
@@ -69,14 +67,6 @@ pub(crate) struct FileArgs {
 fn frames_per_second(text: &str) -> Result<f32, String> {
     let frames = text.parse().ok().filter(|frames| (0.01..=1e6).contains(frames));
     frames.ok_or_else(|| "expected frames of a second, from 0.01 to 1000000".to_owned())
-}
-
-/// An address with a port; a port alone is one of this machine.
-#[cfg(feature = "live")]
-fn loopback_or(text: &str) -> Result<SocketAddr, String> {
-    let port = text.parse().map(|port: u16| (Ipv4Addr::LOCALHOST, port).into());
-    let address = port.or_else(|_| text.parse());
-    address.map_err(|_| "expected a port, or an address with one as 192.0.2.7:8000".to_owned())
 }
 
 fn extension(path: &Path) -> &str {
@@ -148,23 +138,6 @@ impl FileArgs {
         Film::new(scene, a_step, time_step).map(Some)
     }
 
-    /// Begins to serve the page of a run that steps, and prints its address; `None` without the option.
-    #[cfg(feature = "live")]
-    pub(super) fn live(
-        &self,
-        scene: &Scene,
-        title: &str,
-        facts: &[(&str, String)],
-    ) -> Result<Option<Live>> {
-        let Some(address) = self.live else { return Ok(None) };
-        let mut start = Recording::new(scene.bodies(), scene.geometries());
-        let live = start.add(0, 0.0, scene.bodies());
-        let live = live.and_then(|()| Live::start(address, &start, title, facts));
-        let live = live.map_err(|error| Failure::new(Cause::Output, error))?;
-        writeln!(std::io::stderr(), "live at {}", live.url())?;
-        Ok(Some(live))
-    }
-
     /// Writes the files of a course; returns what was written.
     pub(super) fn write(
         &self,
@@ -207,6 +180,24 @@ impl FileArgs {
         }
         Ok(written)
     }
+}
+
+/// Writes the files of the poses.
+pub(super) fn write_files(
+    args: &RunArgs,
+    opened: &OpenBoard,
+    parameters: &StepParameters,
+    scene: &Scene,
+    course: &mut Course,
+) -> Result<Vec<Written>> {
+    let Some(film) = &mut course.film else { return Ok(Vec::new()) };
+    film.end(course.done, scene)?;
+    let mut facts = facts(args, opened, parameters).to_vec();
+    let digest = digest::of_bodies(scene.bodies());
+    facts.push(("time", board_time(opened, course.totals.mean()) + " on average"));
+    facts.push(("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))));
+    facts.push(("digest", format!("{} {digest:016x}", digest::ALGORITHM)));
+    args.files.write(film, &args.scene.text(), &facts)
 }
 
 /// A file that was written.

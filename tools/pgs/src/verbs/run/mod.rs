@@ -3,8 +3,11 @@
 mod beside;
 mod end;
 mod energy;
+mod facts;
 mod files;
 pub(crate) mod film;
+#[cfg(feature = "live")]
+mod live;
 mod row;
 mod summary;
 
@@ -13,15 +16,13 @@ use std::io::{self, Write};
 use clap::Args;
 use scene::{Scene, WarmStart};
 use serde_json::Value;
-use zynq_pgs::board::BoardKind;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::{Capabilities, StepParameters, StepReport};
-#[cfg(feature = "live")]
-use zynq_pgs_view::live::Live;
 
 use self::beside::{Beside, Cold};
 use self::end::{document, print_end};
-use self::files::{FileArgs, Written};
+use self::facts::is_emulated;
+use self::files::{FileArgs, write_files};
 use self::film::Film;
 use self::row::{Row, columns, step};
 use self::summary::Totals;
@@ -35,18 +36,13 @@ use pgs_command::options::build::ThreadsArgs;
 use pgs_command::options::ordering::OrderingArgs;
 use pgs_command::options::planned::PlannedArgs;
 use pgs_command::options::scenes::{ITERATIONS, STEPS, SceneArgs};
-#[cfg(feature = "live")]
-use pgs_command::options::solver::time_of;
-use pgs_command::options::solver::{DeadlineArgs, SolverArgs, time_step_text};
+use pgs_command::options::solver::{DeadlineArgs, SolverArgs};
 use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
-#[cfg(feature = "live")]
-use pgs_command::output::milliseconds;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
 use pgs_command::output::table::{Fixed, heading, line};
 use pgs_command::output::width::terminal;
-use step_folder::digest;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -236,7 +232,7 @@ struct Course {
     film: Option<Film>,
     /// The page that plays the run while it steps.
     #[cfg(feature = "live")]
-    live: Option<Live>,
+    page: Option<live::Page>,
     /// Whether the files of the traced step were written.
     inside: TraceFiles,
 }
@@ -271,24 +267,20 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
     let mut course = Course { cold, ..Course::default() };
     opened.inject(&args.planned, &parameters)?;
     course.film = args.files.film(&scene, args.steps(), parameters.time_step)?;
-
     #[cfg(feature = "live")]
     {
-        let facts = facts(args, &opened, &parameters);
-        course.live = args.files.live(&scene, &args.scene.text(), &facts)?;
+        course.page = live::Page::start(args, &opened, &parameters, &scene)?;
     }
     let meter = energy::start(sensors, course.cold.is_none());
     let scenes = (&mut scene, &mut course);
     let with = (&parameters, tracing.as_ref());
     take_steps(args, common, with, &mut opened, scenes, &interrupt, out)?;
-    #[cfg(feature = "live")]
-    if let Some(live) = course.live.take() {
-        let time = time_of(course.done, parameters.time_step);
-        let mean = board_time(&opened, course.totals.mean());
-        let note = format!("{} steps, {mean} on average", course.done);
-        live.end((course.done, time), &note, scene.bodies());
-    }
+    // Directly behind the steps: the meter also counts the time in which nothing steps.
     course.energy = energy::end(meter, course.done);
+    #[cfg(feature = "live")]
+    if let Some(page) = course.page.take() {
+        page.end(&course, &opened, &scene);
+    }
     let complete = course.is_complete(args.steps());
     let written = write_files(args, &opened, &parameters, &scene, &mut course)?;
     if common.json {
@@ -306,52 +298,6 @@ pub(crate) fn run(args: &RunArgs, common: &CommonArgs, out: &mut dyn Write) -> R
         print_end(args, &opened, &mut scene, &course, out)?;
     }
     Ok(if complete { Verdict::Done } else { Verdict::Interrupted })
-}
-
-/// The facts of a run on its page.
-fn facts(
-    args: &RunArgs,
-    opened: &OpenBoard,
-    parameters: &StepParameters,
-) -> [(&'static str, String); 4] {
-    let StepParameters { contact_iterations, friction_iterations, warm_start, .. } = parameters;
-    let warm = if *warm_start { ", and one more of each for a warm start" } else { "" };
-    let profile = opened.accelerator.capabilities().variant.profile.name;
-    [
-        ("scene", args.scene.text()),
-        ("board", opened.accelerator.board().to_string()),
-        ("profile", profile.to_owned()),
-        (
-            "passes of a step",
-            format!(
-                "{contact_iterations} over contacts, {friction_iterations} over friction{warm}"
-            ),
-        ),
-    ]
-}
-
-/// The time of a step on the board, in words.
-fn board_time(opened: &OpenBoard, milliseconds: f64) -> String {
-    let modelled = if is_emulated(opened) { " (modelled)" } else { "" };
-    format!("{milliseconds:.3} ms a step on the board{modelled}")
-}
-
-/// Writes the files of the poses.
-fn write_files(
-    args: &RunArgs,
-    opened: &OpenBoard,
-    parameters: &StepParameters,
-    scene: &Scene,
-    course: &mut Course,
-) -> Result<Vec<Written>> {
-    let Some(film) = &mut course.film else { return Ok(Vec::new()) };
-    film.end(course.done, scene)?;
-    let mut facts = facts(args, opened, parameters).to_vec();
-    let digest = digest::of_bodies(scene.bodies());
-    facts.push(("time", board_time(opened, course.totals.mean()) + " on average"));
-    facts.push(("steps", format!("{} of {}", course.done, time_step_text(film.time_step()))));
-    facts.push(("digest", format!("{} {digest:016x}", digest::ALGORITHM)));
-    args.files.write(film, &args.scene.text(), &facts)
 }
 
 /// Takes the steps and shows them, until the last one or Ctrl-C.
@@ -377,7 +323,7 @@ fn take_steps(
             let row = row.as_ref().ok().and_then(Option::as_ref);
             tracing.end(row.map(|row| &row.report))
         });
-        // A step that failed is told before a file that cannot be written.
+        // The error of the step comes before the one of a file that cannot be written.
         let row = row.map_err(|error| args.faults.failure(opened, parameters, error))?;
         if let Some(inside) = traced.transpose()? {
             course.inside = inside;
@@ -396,11 +342,8 @@ fn take_steps(
             film.step(course.done, scene)?;
         }
         #[cfg(feature = "live")]
-        if let Some(live) = &mut course.live {
-            let time = time_of(course.done, parameters.time_step);
-            let modelled = milliseconds(row.report.modelled_time());
-            let note = || format!("step {}, {}", course.done, board_time(opened, modelled));
-            live.show((course.done, time), note, scene.bodies());
+        if let Some(page) = &mut course.page {
+            page.step(course.done, &row.report, opened, scene);
         }
         course.retries += u64::from(row.report.retries);
         course.totals.add(&row);
@@ -437,11 +380,6 @@ fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
         used <= terminal().saturating_add(1)
     };
     all.take_while(fits).collect()
-}
-
-/// Whether the times of the board are modelled.
-fn is_emulated(opened: &OpenBoard) -> bool {
-    matches!(opened.accelerator.board().kind, BoardKind::Emulated | BoardKind::Served)
 }
 
 /// The board, the scene, the first step's order, and the names of the columns.
