@@ -4,6 +4,7 @@ pub mod facts;
 pub mod files;
 pub mod order;
 pub mod progress;
+pub mod rows;
 pub mod table;
 pub mod width;
 

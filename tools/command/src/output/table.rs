@@ -1,8 +1,6 @@
-//! A table of typed cells, and its four renderings: text, JSON, Markdown and HTML; and rows that
-//! are printed as they come.
+//! A table of typed cells, and its four renderings: text, JSON, Markdown and HTML.
 
 use std::fmt::Write as _;
-use std::io::{self, Write};
 
 use crate::numbers::{grouped, number, signed};
 use crate::output::width::wrapped;
@@ -89,44 +87,12 @@ pub struct Column {
     pub head: &'static str,
 }
 
-/// A column of rows that are printed as they come, at the right of its width in characters.
-#[derive(Debug, Clone, Copy)]
-pub struct Fixed {
-    /// Its name.
-    pub name: &'static str,
-    /// The unit below the name.
-    pub unit: &'static str,
-    /// Its width in characters.
-    pub width: usize,
-}
-
-/// Writes the two lines of heading.
-///
-/// # Errors
-///
-/// Fails where the output takes no more.
-pub fn heading(out: &mut dyn Write, columns: &[Fixed]) -> io::Result<()> {
-    line(out, columns, columns.iter().map(|column| column.name.to_owned()))?;
-    line(out, columns, columns.iter().map(|column| column.unit.to_owned()))
-}
-
-/// Writes one row.
-///
-/// # Errors
-///
-/// Fails where the output takes no more.
-pub fn line(
-    out: &mut dyn Write,
-    columns: &[Fixed],
-    cells: impl IntoIterator<Item = String>,
-) -> io::Result<()> {
-    let cells: Vec<String> = cells.into_iter().collect();
-    let places = columns.iter().map(|column| (column.width, true));
-    writeln!(out, "{}", aligned(&cells, places, " "))
-}
-
 /// Cells in a line, each at the right or the left of its width, with a space between two.
-fn aligned(cells: &[String], places: impl Iterator<Item = (usize, bool)>, space: &str) -> String {
+pub(super) fn aligned(
+    cells: &[String],
+    places: impl Iterator<Item = (usize, bool)>,
+    space: &str,
+) -> String {
     let cells: Vec<String> = places
         .zip(cells)
         .map(|((width, at_right), cell)| match at_right {

@@ -7,7 +7,7 @@ use zynq_pgs::{Accelerator, StepParameters};
 
 use super::row::{Row, step};
 use super::summary::FinalState;
-use pgs_command::output::table::Fixed;
+use pgs_command::output::rows::Fixed;
 
 /// The columns that the scene adds to the table of the run.
 pub(super) const COLUMNS: [Fixed; 2] = [

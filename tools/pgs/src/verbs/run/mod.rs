@@ -41,7 +41,7 @@ use pgs_command::output::facts::fact;
 use pgs_command::output::files::Files;
 use pgs_command::output::order;
 use pgs_command::output::progress::progress_bar;
-use pgs_command::output::table::{Fixed, heading, line};
+use pgs_command::output::rows::{Fixed, heading, line};
 use pgs_command::output::width::terminal;
 
 const EXAMPLES: &str = "\

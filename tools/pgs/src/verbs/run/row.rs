@@ -9,7 +9,7 @@ use zynq_pgs::{Accelerator, StepParameters, StepReport};
 use crate::a53::Paper;
 use pgs_command::board::is_cancelled;
 use pgs_command::numbers::grouped;
-use pgs_command::output::table::Fixed;
+use pgs_command::output::rows::Fixed;
 use pgs_command::output::{milliseconds, report_json};
 
 /// Share of the last step's impulses that a warm step begins with (Bullet's).

@@ -1,6 +1,8 @@
 //! The headline: one step of a pile on the thesis' design as it describes it, on a pipeline that
 //! waits, and on the boards of this project; their kinetic energy, and both piles after more steps.
 
+mod piles;
+
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,18 +15,16 @@ use pgs_command::numbers::{grouped, number};
 use pgs_command::options::scenes::DROP;
 use pgs_command::output::files::{Files, Named, check_folder, unwritten};
 use pgs_command::{pile, step_input};
-use scene::{Grid, Scene, kinetic_energy};
+use scene::{Grid, kinetic_energy};
 use step_folder::replace::replace;
 use zynq_pgs::emulation::Build;
 use zynq_pgs::order::Order;
 use zynq_pgs::{Body, StepParameters, StepReport};
-use zynq_pgs_view::picture::{Camera, Picture};
-use zynq_pgs_view::{Recording, ViewError};
 
+use self::piles::piles;
 use super::start::World;
 use crate::estimate::thesis::recorded::{Design, FLOAT_DESIGN, HALF_DESIGN};
 use crate::experiment::{Boards, Experiment, Measure, PILES, Part, shown};
-use crate::figure::Figure;
 use crate::index::{Origin, Row};
 use crate::session::Session;
 use crate::table::{Cell, Kind, Table, text};
@@ -68,10 +68,6 @@ pub(crate) struct Options {
 const FALL: u32 = 30;
 /// Steps of each board.
 const STEPS: u32 = 120;
-/// Pixels of a pile in the picture.
-const SIZE: [u16; 2] = [600, 400];
-/// Its distance, of the distance at which our pile fills the picture.
-const AWAY: f32 = 1.7;
 
 /// What the thesis says of hazards.
 const CLAIM: &str = "recorded (§5.4.4): the dependences between collisions are declared false, \
@@ -160,7 +156,11 @@ impl Measure for Options {
         part.fact("step", self.subject(&runs[0].report));
         part.fact("thesis", CLAIM);
         if let World::Scene(scene) = &world {
-            let figure = piles(scene, [&runs[0], &runs[2]])?;
+            let figure = piles(
+                scene,
+                STEPS,
+                [0, 2].map(|k: usize| (SIDES[k].name, runs[k].bodies.as_slice())),
+            )?;
             if let Some(path) = &self.picture {
                 replace(path, |file| file.write_all(figure.svg.as_bytes())).map_err(unwritten)?;
                 part.fact("picture", path.display().to_string());
@@ -342,46 +342,6 @@ fn table(id: &'static str) -> Table {
         Kind::Recorded.cell(),
     ]);
     table
-}
-
-/// Both piles beside each other, seen from one place: the thesis' design, and ours.
-fn piles(start: &Scene, runs: [&Run; 2]) -> Result<Figure> {
-    let recorded = |run: &Run| {
-        let mut recording = Recording::new(start.bodies(), start.geometries());
-        recording.add(0, 0.0, start.bodies())?;
-        recording.add(STEPS, 1.0, &run.bodies)?;
-        Ok(recording)
-    };
-    let recordings: Result<Vec<_>, ViewError> = runs.into_iter().map(recorded).collect();
-    let recordings = recordings.map_err(Failure::input)?;
-    let [width, height] = SIZE;
-    let near = Picture::of(&recordings[1]).camera;
-    let back = |axis: usize| near.target[axis] + AWAY * (near.eye[axis] - near.target[axis]);
-    let camera = Camera { eye: [0, 1, 2].map(back), ..near };
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" \
-         font-family=\"sans-serif\" font-size=\"18\" text-anchor=\"middle\">\n",
-        2 * width,
-        height + 30
-    );
-    for (place, (recording, side)) in (0_u16..).zip(recordings.iter().zip([&SIDES[0], &SIDES[2]])) {
-        let picture = Picture { camera, width, height, ..Picture::of(recording) };
-        let inner = picture.svg().map_err(Failure::input)?;
-        let left = place * width;
-        let size = format!("<svg x=\"{left}\" width=\"{width}\" height=\"{height}\"");
-        svg += &inner.replacen("<svg", &size, 1);
-        svg += &format!(
-            "<text x=\"{}\" y=\"{}\" fill=\"#808080\">{}</text>\n",
-            left + width / 2,
-            height + 22,
-            side.name
-        );
-    }
-    svg += "</svg>\n";
-    let title = format!("The pile after {STEPS} steps on the emulated boards");
-    let caption = "Left the thesis' design as it describes itself, with stale reads; right ours. \
-                   Both start from one state and take as long a step.";
-    Ok(Figure::new((PILES, "§5.4.4"), title, svg, caption).modelled())
 }
 
 #[cfg(test)]
