@@ -99,8 +99,8 @@ fn wrong_usage_ends_with_2_and_says_so_on_stderr() {
 fn a_wrong_verb_or_option_gets_a_suggestion() {
     for (words, similar) in [
         ("checks", "check"),
-        ("solv x", "solve"),
-        ("thesis determination", "determinism"),
+        ("solves x", "solve"),
+        ("thesis determine", "determinism"),
         ("--step 4", "--steps"),
         ("run --boards emulated", "--board"),
         ("serve --sockets x", "--socket"),

@@ -286,4 +286,14 @@ fn the_full_step_deviates_as_others_measured() {
     let pairs = at(&document, 1, PAIRS);
     near(&pairs["position_mean_percent"], 0.038, 0.004);
     near(&pairs["position_under_1_percent"], 99.2, 0.2);
+    // As `docs/thesis.md` has them, beside the thesis' own row.
+    let document = study(&["step", "--input", text(&folder)]);
+    let boards = rows(&document, "given_step")[1..].iter();
+    for (row, [ms, after]) in
+        boards.zip([[7.751, 190.4], [679.982, 138.8], [7.763, 140.1], [6.336, 141.0]])
+    {
+        near(&row["ms"], ms, 0.000_5);
+        near(&row["before_kj"], 154.8, 0.05);
+        near(&row["after_kj"], after, 0.05);
+    }
 }

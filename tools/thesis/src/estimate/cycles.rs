@@ -13,7 +13,7 @@
 
 use super::step::StepShape;
 use super::traffic::{Records, StepTraffic};
-use pgs_interface::profile::{Profile, Variant};
+use pgs_interface::profile::Variant;
 
 /// Clock cycles of a step by the formula, part by part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,19 +63,13 @@ impl StepCycles {
     pub fn integration(&self) -> u64 {
         self.pose_in.max(self.result_out)
     }
-
-    /// The time of the step at the profile's clock, s.
-    #[must_use]
-    pub fn seconds(&self, profile: &Profile) -> f64 {
-        self.total as f64 / (f64::from(profile.clock_khz) * 1e3)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimate::thesis;
-    use pgs_interface::profile::{FLOAT, HALF, NAIVE};
+    use pgs_interface::profile::{FLOAT, HALF, NAIVE, Profile};
 
     const THESIS_STEP: StepShape = thesis::step();
 

@@ -71,8 +71,6 @@ pub struct PortAccount {
     pub arrays: Vec<PortUse>,
     /// Interval that the streams allow: cycles of the busiest stream for one issue.
     pub by_streams: u32,
-    /// Interval in the table of profiles.
-    pub claimed: u32,
 }
 
 impl PortAccount {
@@ -99,19 +97,13 @@ impl PortAccount {
         if memory.shape_index_bytes > 0 {
             arrays.push(PortUse { array: OnChipArray::ShapeIndices, writes: 0, ..plain });
         }
-        Self { arrays, by_streams: stream_interval(variant), claimed: profile.initiation_interval }
+        Self { arrays, by_streams: stream_interval(variant) }
     }
 
     /// Interval that the ports of all arrays allow.
     #[must_use]
     pub fn by_ports(&self) -> u32 {
         self.arrays.iter().map(PortUse::interval).max().unwrap_or(1)
-    }
-
-    /// The smallest interval that ports and streams allow.
-    #[must_use]
-    pub fn smallest(&self) -> u32 {
-        self.by_ports().max(self.by_streams)
     }
 
     /// Use of the velocities' ports; they decide.
@@ -152,8 +144,8 @@ mod tests {
             for inertia in [Inertia::Isotropic, Inertia::World] {
                 let variant = Variant { inertia, ..profile.default_variant() };
                 let account = PortAccount::new(&variant);
-                assert_eq!(account.smallest(), profile.initiation_interval, "{}", profile.name);
-                assert_eq!(account.claimed, profile.initiation_interval);
+                let smallest = account.by_ports().max(account.by_streams);
+                assert_eq!(smallest, profile.initiation_interval, "{}", profile.name);
             }
         }
     }
