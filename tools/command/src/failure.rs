@@ -278,6 +278,7 @@ mod tests {
         assert!(stderr.is_empty());
         Failure::from(io::Error::from(io::ErrorKind::StorageFull)).report(&mut stderr);
         let text = String::from_utf8(stderr).expect("text");
-        assert!(text.contains(" standard output cannot be written\n  because: "), "{text}");
+        let expected = format!("{BAD}error:{BAD:#} standard output cannot be written\n  because: ");
+        assert!(text.starts_with(&expected), "{text}");
     }
 }

@@ -4,7 +4,8 @@ use super::rows::{ContactRows, FrictionRows};
 use super::vector::{Vec3, add, cross, dot, negate, scale, subtract, times};
 use super::{Moving, index};
 
-/// 1 minus the factor by which a friction pass damps the spin about the normal.
+/// 1 minus the factor by which a friction pass damps the spin about the normal, as in Bullet's pipeline
+/// and in `StepParameters::thesis`.
 const SPIN_DAMPING: f32 = 0.1;
 
 /// A direction and the moments about it.

@@ -21,7 +21,7 @@ pub struct ThreadsArgs {
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Emulated board")]
 pub struct BuiltArgs {
-    /// Emulated board: emulated[:BUILD], as for `pgs run`
+    /// Emulated board, `emulated[:BUILD]`, as for `pgs run`
     #[arg(long, value_name = "BOARD", value_parser = built)]
     pub board: Option<Build>,
 }

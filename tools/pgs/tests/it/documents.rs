@@ -224,6 +224,26 @@ fn the_comparison_of_the_readme_is_that_of_the_page_and_of_its_table() {
 }
 
 #[test]
+fn the_figures_by_formula_are_what_the_commands_print() {
+    let cycles = run(["thesis", "cycles"]).stdout + &run(["thesis", "memory"]).stdout;
+    for (page, figures) in [
+        ("README.md", &["2,062,697", "2,066,606"][..]),
+        ("docs/worth.md", &["2,062,697", "2,066,606", "2,093,336", "9.290", "2.83"]),
+        ("docs/thesis.md", &["2,062,697", "2,066,606", "1,551,477", "1,557,317"]),
+        ("docs/profiles.md", &["29,384,064", "2,093,336", "1,572,861", "9.290", "6.313"]),
+    ] {
+        let text = text(page);
+        for figure in figures {
+            assert!(text.contains(figure) && cycles.contains(figure), "{page}: {figure}\n{cycles}");
+        }
+    }
+    // One number of faults, wherever it is quoted.
+    for page in ["README.md", "docs/worth.md"] {
+        assert!(text(page).contains("7,892"), "{page}");
+    }
+}
+
+#[test]
 fn the_readme_says_first_what_does_not_exist_yet() {
     let readme = text("README.md");
     let lines = readme.lines().count();
