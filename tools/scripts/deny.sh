@@ -12,11 +12,18 @@ set -euo pipefail
 cd "$repository"
 
 need_cargo_tool cargo-deny cargo-deny 0.20.2
-attend "$tool" --locked check --hide-inclusion-graph bans licenses sources
+# The other two are workspaces of their own.
+manifests=(Cargo.toml tools/python/Cargo.toml tools/clients/rapier/Cargo.toml)
+deny() {
+	for manifest in "${manifests[@]}"; do
+		attend "$tool" --locked --manifest-path "$repository/$manifest" check --hide-inclusion-graph "$@"
+	done
+}
+deny bans licenses sources
 
 # The vulnerabilities are in a database that is fetched anew.
 if attend timeout 300 "$tool" --locked fetch db; then
-	attend "$tool" --locked check --disable-fetch advisories
+	deny --disable-fetch advisories
 else
 	echo "skipped: known vulnerabilities (the advisory database cannot be fetched)"
 fi

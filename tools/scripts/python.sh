@@ -14,6 +14,11 @@ cd "$repository"
 export CARGO_TARGET_DIR=$target_root/python PYTHONDONTWRITEBYTECODE=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 manifest=tools/python/Cargo.toml
 
+version() { sed -n 's/^version = "\(.*\)"/\1/p' "$1" | head -n 1; }
+for file in $manifest tools/python/pyproject.toml; do
+	[ "$(version $file)" = "$(version Cargo.toml)" ] || fail "$file has another version than Cargo.toml"
+done
+
 # Everything from the registries first.
 work=$(mktemp -d)
 litter+=("$work")

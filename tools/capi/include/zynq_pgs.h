@@ -111,7 +111,8 @@ typedef struct zpgs_parameters {
     float friction;
     // Share of the angular velocity that a step with integration leaves, from 0 to 1.
     float angular_damping;
-    // Share of the spin about the normal that every friction pass takes, from 0 to 1.
+    // Share of the spin about the normal that every friction pass takes, from 0 to 1: 10 % in the
+    // thesis, 0 here.
     float spin_damping;
     // Gravity, m/s^2, world frame; only a step with integration uses it.
     float gravity[3];
@@ -164,10 +165,9 @@ typedef struct zpgs_strided_const {
 // The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
 // frame.
 //
-// During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
-// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with
-// another of its arguments. Elements of several arrays may alternate, as the members of an array
-// of structures do.
+// During a call no other thread writes the arrays. A call with bodies refuses arrays that share a
+// byte with each other or with another of its arguments. Elements of several arrays may alternate,
+// as the members of an array of structures do.
 typedef struct zpgs_bodies {
     // Size of the structure, as the caller's header has it.
     size_t size;
@@ -184,7 +184,8 @@ typedef struct zpgs_bodies {
     // Indices into the shapes: `uint32_t`.
     struct zpgs_strided_const shapes;
     // The shapes of this world, a dense array: the step loads them where the accelerator has
-    // others, so that worlds with shapes of their own share it.
+    // others, so that worlds with shapes of their own share it. They stay loaded, also where the
+    // step is refused.
     const struct zpgs_shape *table;
     // Number of these shapes. 0: the step takes the shapes that the accelerator has.
     size_t table_count;

@@ -33,10 +33,9 @@ pub struct StridedConst {
 /// The bodies of a step, in the caller's own memory. Units are m, s, kg and rad, in the world
 /// frame.
 ///
-/// During a call no other thread writes the arrays. A call that writes the bodies (`zpgs_step`,
-/// `zpgs_wait`, `zpgs_wait_and_start`) refuses arrays that share a byte with each other or with
-/// another of its arguments. Elements of several arrays may alternate, as the members of an array
-/// of structures do.
+/// During a call no other thread writes the arrays. A call with bodies refuses arrays that share a
+/// byte with each other or with another of its arguments. Elements of several arrays may alternate,
+/// as the members of an array of structures do.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyArrays {
@@ -55,7 +54,8 @@ pub struct BodyArrays {
     /// Indices into the shapes: `uint32_t`.
     pub shapes: StridedConst,
     /// The shapes of this world, a dense array: the step loads them where the accelerator has
-    /// others, so that worlds with shapes of their own share it.
+    /// others, so that worlds with shapes of their own share it. They stay loaded, also where the
+    /// step is refused.
     pub table: *const Shape,
     /// Number of these shapes. 0: the step takes the shapes that the accelerator has.
     pub table_count: usize,

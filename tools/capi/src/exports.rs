@@ -173,19 +173,12 @@ pub unsafe extern "C" fn zpgs_step(
     call_with(handle, |state| {
         // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
         // call; this call alone uses the bodies, and no thread writes the others.
-        let structure = unsafe { span(bodies) };
-        // SAFETY: as above.
-        let structures = [structure, unsafe { span(collisions) }];
-        // SAFETY: as above.
-        let structures = structures.into_iter().chain([unsafe { span(parameters) }]);
-        // SAFETY: as above.
-        let (mut bodies, collisions, parameters) =
+        let (mut bodies, collisions, parameters, inputs) =
             unsafe { read_input(bodies, collisions, parameters) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.
         let report = unsafe { Out::<Report>::optional(report) }?;
-        let inputs = structures.chain(collisions.inputs());
-        outputs_apart(&bodies, report.as_ref(), None, inputs)?;
+        outputs_apart(&bodies, report.as_ref(), None, inputs.into_iter())?;
         let done = state.step(&mut bodies, &collisions, &parameters)?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
@@ -390,13 +383,15 @@ pub(crate) unsafe fn with_input<'a>(
     call_with(handle, |state| {
         // SAFETY: the pointers are null or lead to their structures, whose arrays live through the
         // call; this call alone uses the bodies, and no thread writes the others.
-        let (bodies, collisions, parameters) =
+        let (bodies, collisions, parameters, inputs) =
             unsafe { read_input(bodies, collisions, parameters) }?;
+        // The call that ends the step would refuse them for ever.
+        outputs_apart(&bodies, None, None, inputs.into_iter())?;
         act(state, &bodies, &collisions, &parameters)
     })
 }
 
-/// Reads and checks the input of a step.
+/// Reads and checks the input of a step; the spans are of all but the arrays of the bodies.
 ///
 /// # Safety
 /// Each pointer is null or leads to its structure, with the size in it, whose arrays are as it
@@ -405,17 +400,24 @@ pub(crate) unsafe fn read_input<'a>(
     bodies: *const BodyArrays,
     collisions: *const CollisionArray,
     parameters: *const Parameters,
-) -> Result<(BodiesView<'a>, CollisionsView<'a>, StepParameters), Failure> {
-    // SAFETY: the pointer is null or leads to the structure, whose arrays are as it describes:
-    // `# Safety` of this function.
+) -> Result<(BodiesView<'a>, CollisionsView<'a>, StepParameters, [Span; 6]), Failure> {
+    // SAFETY: each pointer is null or leads to its structure, whose arrays are as it describes:
+    // `# Safety` of this function. The same holds below.
+    let first = unsafe { span(bodies) };
+    // SAFETY: as above.
+    let second = unsafe { span(collisions) };
+    // SAFETY: as above.
+    let third = unsafe { span(parameters) };
+    // SAFETY: as above.
     let bodies = unsafe { read_bodies(bodies) }?;
     // SAFETY: as above.
     let collisions = unsafe { read_collisions(collisions) }?;
-    // SAFETY: the pointer is null or leads to a structure of the size in it: `# Safety` of this
-    // function.
+    // SAFETY: as above.
     let parameters = unsafe { read_parameters(parameters) }?;
     check_impulses(&collisions, &parameters)?;
-    Ok((bodies, collisions, parameters))
+    let [all, impulses, places] = collisions.inputs();
+    let inputs = [first, second, third, all, impulses, places];
+    Ok((bodies, collisions, parameters, inputs))
 }
 
 /// Reads and checks the parameters of a step.

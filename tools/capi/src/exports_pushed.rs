@@ -5,9 +5,9 @@
 use crate::arrays::BodyArrays;
 use crate::barrier::call_with;
 use crate::collision::{Collision, Impulses};
-use crate::exports::{read_bodies, read_parameters};
+use crate::exports::{outputs_apart, read_bodies, read_parameters};
 use crate::handle::AcceleratorHandle;
-use crate::memory;
+use crate::memory::{self, span};
 use crate::parameters::Parameters;
 use crate::status::Status;
 
@@ -84,9 +84,12 @@ pub unsafe extern "C" fn zpgs_end(
     call_with(handle, |state| {
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
+        let structures = [unsafe { span(bodies) }];
+        // SAFETY: as above.
         let bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `parameters` is null or leads to a structure of the size in it.
         let parameters = unsafe { read_parameters(parameters) }?;
+        outputs_apart(&bodies, None, None, structures.into_iter())?;
         state.submit_pushed(&bodies, &parameters)
     })
 }

@@ -216,8 +216,7 @@ impl State {
 
     /// Takes the ticket of the step in flight.
     fn ticket(&mut self) -> Result<Detached, Failure> {
-        let none = || Failure::sequence("no step is in flight: call zpgs_submit or zpgs_end first");
-        self.ticket.take().ok_or_else(none)
+        self.ticket.take().ok_or_else(none_in_flight)
     }
 
     /// Packs another step while one is in flight.
@@ -227,6 +226,10 @@ impl State {
         collisions: &CollisionsView<'_>,
         parameters: &StepParameters,
     ) -> Result<(), Failure> {
+        // Without a step in flight the shapes would be loaded.
+        if self.ticket.is_none() {
+            return Err(none_in_flight());
+        }
         self.load_shapes(bodies)?;
         let ticket = self.ticket()?;
         self.prepared = None;
@@ -271,6 +274,11 @@ impl State {
         let ticket = self.ticket()?;
         Ok(self.accelerator.attach(ticket)?.wait(bodies)?)
     }
+}
+
+/// A call that needs a step in flight.
+fn none_in_flight() -> Failure {
+    Failure::sequence("no step is in flight: call zpgs_submit or zpgs_end first")
 }
 
 /// Hands the collisions over, with the impulses at their places in the last step of their world.

@@ -80,7 +80,8 @@ pub struct Parameters {
     pub friction: f32,
     /// Share of the angular velocity that a step with integration leaves, from 0 to 1.
     pub angular_damping: f32,
-    /// Share of the spin about the normal that every friction pass takes, from 0 to 1.
+    /// Share of the spin about the normal that every friction pass takes, from 0 to 1: 10 % in the
+    /// thesis, 0 here.
     pub spin_damping: f32,
     /// Gravity, m/s^2, world frame; only a step with integration uses it.
     pub gravity: [f32; 3],

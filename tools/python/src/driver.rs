@@ -133,7 +133,18 @@ impl Handle {
             // SAFETY: as in `step`.
             false => unsafe { zpgs_wait(handle, bodies, report_at) },
         };
-        (self.check(done).map(|()| report), self.check(started))
+        let done = self.check(done).map(|()| report);
+        // The accelerator has the text of one failure.
+        let started = match (&done, started) {
+            (_, Status::Ok) => Ok(()),
+            (Ok(_), status) => self.check(status),
+            (Err(_), status) => Err(Failure::new(
+                status,
+                "the step did not start; the one before it had failed, too: the bodies are as they \
+                 were",
+            )),
+        };
+        (done, started)
     }
 
     /// Stores the impulses of the last step that gave them out.

@@ -10,7 +10,7 @@ mod failure;
 mod parameters;
 mod report;
 
-use numpy::{AllowTypeChange, PyArray1, PyArrayLike1};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use zynq_pgs_c::zpgs_count_with_friction;
@@ -31,10 +31,15 @@ fn _driver(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 fn with_friction<'py>(
     py: Python<'py>,
-    count: PyArrayLike1<'py, u32, AllowTypeChange>,
+    count: &Bound<'py, PyAny>,
     friction: PyArrayLike1<'py, f32, AllowTypeChange>,
 ) -> PyResult<Bound<'py, PyArray1<u32>>> {
-    let (count, friction) = (count.as_array(), friction.as_array());
+    // Numbers of another type one by one, each in its range: a conversion by numpy would wrap.
+    let count = match count.extract::<PyReadonlyArray1<'py, u32>>() {
+        Ok(array) => array.as_array().to_vec(),
+        Err(_) => count.extract::<Vec<u32>>()?,
+    };
+    let friction = friction.as_array();
     if count.len() != friction.len() {
         return Err(PyValueError::new_err(format!(
             "found {} counts and {} frictions: give as many of one as of the other",

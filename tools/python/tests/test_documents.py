@@ -1,4 +1,4 @@
-"""The examples of the documents run, and are those of the repository."""
+"""The examples of the documents run, and docs/engines.md shows lines of an example file."""
 
 import pathlib
 import re

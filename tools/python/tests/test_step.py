@@ -84,6 +84,22 @@ def test_doubles_get_the_results_and_keep_the_digits_of_numbers_that_stay(board)
     assert (doubles["position"][0] == 0.1).all(), "the static body"
 
 
+@pytest.mark.parametrize("number", ["<f4", "<f8"])
+def test_structures_with_other_fields_are_taken_if_aligned_and_else_refused(board, number):
+    bodies, collisions = pile(20)
+    board.set_shapes(SHAPES)
+    fields = [(field, number, bodies[field].shape[1]) for field in FIELDS] + [("shape", "<u4"), ("name", "S3")]
+    packed, aligned = (np.zeros(len(bodies), np.dtype(fields, align=align)) for align in (False, True))
+    for field in zynq_pgs.BODY.names:
+        packed[field] = aligned[field] = bodies[field]
+    with pytest.raises(ValueError, match=f"stride of the positions.*multiple of {number[2]}"):
+        board.step(packed, collisions)
+    board.step(bodies, collisions)
+    board.step(aligned, collisions)
+    for field in FIELDS:
+        assert np.array_equal(aligned[field].astype(np.float32), bodies[field]), field
+
+
 def test_collisions_may_lie_apart(board):
     bodies, collisions = pile(20)
     board.set_shapes(SHAPES)
@@ -136,3 +152,13 @@ def test_each_pair_has_a_friction_of_its_own(board):
     assert bodies["linear_velocity"][1, 0] == 3 and bodies["linear_velocity"][2, 0] < 2.9
     with pytest.raises(ValueError, match="2 counts and 3 frictions"):
         zynq_pgs.with_friction([1, 1], [0.0, 0.5, 0.5])
+
+
+def test_a_count_is_a_whole_number_of_32_bits_of_any_type():
+    expected = zynq_pgs.with_friction([0, 4], [0.5, 0.25])
+    for dtype in (np.uint8, np.uint32, np.int64):
+        assert np.array_equal(zynq_pgs.with_friction(np.array([0, 4], dtype), [0.5, 0.25]), expected)
+    for error, count in [(OverflowError, -1), (OverflowError, 2**32), (TypeError, 1.7)]:
+        for given in ([count], np.array([count])):
+            with pytest.raises(error):
+                zynq_pgs.with_friction(given, [0.5])

@@ -56,6 +56,21 @@ def test_each_world_of_the_environment_is_the_same_alone():
         assert all(np.array_equal(one[0], all_[world]) for one, all_ in zip(alone, together)), world
 
 
+def test_a_list_has_a_seed_for_each_world():
+    env = PushBalls(3, board="emulated")
+    from_seven, given = env.reset(seed=7)[0], env.reset(seed=[9, 7, 8])[0]
+    assert np.array_equal(given, from_seven[[2, 0, 1]])
+    with pytest.raises(ValueError, match="2 seeds for 3 worlds"):
+        env.reset(seed=[1, 2])
+
+
+@pytest.mark.parametrize("balls", [1, 17])
+def test_a_number_of_balls_that_the_grid_cannot_take_is_refused_and_closes(balls):
+    with pytest.raises(ValueError, match=f"{balls} balls"):
+        PushBalls(2, balls=balls, board="emulated")
+    PushBalls.__new__(PushBalls).close()
+
+
 def test_a_push_towards_the_second_ball_moves_it_and_ends_the_episode_at_the_goal():
     env = PushBalls(1, balls=2, board="emulated")
     env.reset(seed=1)

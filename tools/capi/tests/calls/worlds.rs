@@ -47,6 +47,10 @@ fn a_step_is_prepared_for_the_shapes_of_the_one_in_flight_alone() {
     let prepare = |bodies: &BodyArrays| {
         made!(zpgs_prepare(open.0, from_ref(bodies), from_ref(&all), from_ref(&parameters)))
     };
+    assert_eq!(prepare(&arrays_with(&mut right, &HEAVY)), Status::Sequence, "none is in flight");
+    let mut light = world();
+    assert_eq!(open.step(&arrays(&mut light), &all, &parameters), Status::Ok, "{}", open.text());
+    assert_eq!(light, alone(&SHAPES, 1), "the refused step has loaded no shapes");
     assert_eq!(open.submit(&arrays_with(&mut left, &HEAVY), &all), Status::Ok, "{}", open.text());
     assert_eq!(prepare(&arrays_with(&mut right, &SHAPES)), Status::Sequence);
     assert!(open.text().contains("one table of all shapes"), "{}", open.text());

@@ -21,6 +21,12 @@ const CALLS_MAX: u32 = 12;
 /// Bytes around each structure: more than the largest size that the interface takes.
 const STRUCTURE_BYTES: usize = 4104;
 
+/// The shapes that the accelerator has at first.
+static SHAPES: [Shape; 2] = [
+    Shape { inverse_mass: 0.0, inverse_inertia: [0.0; 3] },
+    Shape { inverse_mass: 1.0, inverse_inertia: [2.0; 3] },
+];
+
 /// Elements in memory of their own, at a stride.
 struct Column {
     words: Vec<u32>,
@@ -33,26 +39,39 @@ struct Column {
 }
 
 impl Column {
-    /// `count` elements of these words; now and then where the interface takes none.
+    /// `count` elements of these words, or of the doubles of these floats where `size` is 8; now and
+    /// then where the interface takes none.
     fn any<const N: usize>(
         input: &mut Input<'_>,
         count: usize,
+        size: usize,
         mut words_of: impl FnMut(&mut Input<'_>, usize) -> [u32; N],
     ) -> Self {
-        let element = 4 * N;
+        let unit = if size == 8 { 8 } else { 4 };
+        let element = unit * N;
         let stride = match input.below(24) {
             0 => element - 4,
             1 => element + input.index(4),
-            2..=8 => element + 4 * input.index(4),
+            2..=8 => element + unit * input.index(4),
             _ => element,
         };
-        let offset = if input.one_in(24) { input.index(8) } else { 4 * input.index(4) };
+        let offset = if input.one_in(24) { input.index(8) } else { unit * input.index(4) };
         // Room for every element, whatever the stride.
         let words = (offset + count * stride.max(element)).div_ceil(4) + 4;
         let mut words: Vec<u32> = (0..words).map(|_| 0xC5C5_C5C5).collect();
         for number in 0..count {
             let at = (offset + number * stride) / 4;
-            words[at..at + N].copy_from_slice(&words_of(input, number));
+            for (word, to) in words_of(input, number).iter().zip(words[at..].chunks_mut(unit / 4)) {
+                match to {
+                    [low, high] => {
+                        let double = f64::from(f32::from_bits(*word));
+                        let [a, b, c, d, e, f, g, h] = double.to_ne_bytes();
+                        *low = u32::from_ne_bytes([a, b, c, d]);
+                        *high = u32::from_ne_bytes([e, f, g, h]);
+                    }
+                    _ => to.fill(*word),
+                }
+            }
         }
         let null = input.one_in(64);
         Self { before: words.clone(), words, offset, stride, element, count, null }
@@ -114,6 +133,8 @@ impl Sized {
 struct Bodies {
     columns: [Column; 4],
     shapes: Column,
+    /// They stay where they are: the structure has their address.
+    _table: Vec<Shape>,
     structure: Sized,
 }
 
@@ -123,19 +144,22 @@ impl Bodies {
             if input.one_in(200) { input.word() } else { input.share().to_bits() }
         };
         let one = 1_f32.to_bits();
-        let mut columns = [
-            Column::any(input, count, |input, at| [(2.0 * at as f32).to_bits(), small(input), 0]),
-            Column::any(input, count, |_, _| [0, 0, 0, one]),
-            Column::any(
-                input,
-                count,
-                |input, at| if at == 0 { [0; 3] } else { [small(input), 0, 0] },
-            ),
-            Column::any(input, count, |_, _| [0; 3]),
-        ];
-        let mut shapes = Column::any(input, count, |input, at| {
+        let size = input.pick(&[0, 4, 8, 8, 0, 4, 8, 2]);
+        let mut columns =
+            [
+                Column::any(input, count, size, |input, at| {
+                    [(2.0 * at as f32).to_bits(), small(input), 0]
+                }),
+                Column::any(input, count, size, |_, _| [0, 0, 0, one]),
+                Column::any(input, count, size, |input, at| {
+                    if at == 0 { [0; 3] } else { [small(input), 0, 0] }
+                }),
+                Column::any(input, count, size, |_, _| [0; 3]),
+            ];
+        let mut shapes = Column::any(input, count, 4, |input, at| {
             [if input.one_in(100) { input.word() } else { u32::from(at > 0) }]
         });
+        let table = table(input);
         let [positions, orientations, linear, angular] = &mut columns;
         let arrays = BodyArrays {
             size: 0,
@@ -145,14 +169,39 @@ impl Bodies {
             linear_velocities: linear.strided(),
             angular_velocities: angular.strided(),
             shapes: shapes.constant(),
-            ..BodyArrays::default()
+            table: if input.one_in(64) { ptr::null() } else { table.as_ptr() },
+            table_count: table.len(),
+            number_size: size,
+            origin: origin(input),
         };
-        Self { columns, shapes, structure: Sized::any(input, arrays) }
+        Self { columns, shapes, _table: table, structure: Sized::any(input, arrays) }
     }
 
     fn check(&self, written: bool) {
         self.columns.iter().for_each(|column| column.check(written));
         self.shapes.check(false);
+    }
+}
+
+/// The shapes of a world: mostly none, or some that differ from the accelerator's.
+fn table(input: &mut Input<'_>) -> Vec<Shape> {
+    let count = if input.one_in(4) { 1 + input.index(3) } else { 0 };
+    let mut table = SHAPES.to_vec();
+    table.resize(count, SHAPES[1]);
+    if let Some(last) = table.last_mut().filter(|_| input.one_in(2)) {
+        let wild = input.one_in(16);
+        last.inverse_mass = if wild { f32::from_bits(input.word()) } else { 2.0 };
+    }
+    table
+}
+
+/// The origin of a world: mostly 0, near, or far.
+fn origin(input: &mut Input<'_>) -> [f64; 3] {
+    match input.below(32) {
+        0..=23 => [0.0; 3],
+        24..=29 => [0.0; 3].map(|_| f64::from(input.share())),
+        30 => [0.0; 3].map(|_| 1e6 * f64::from(input.share())),
+        _ => [0.0; 3].map(|_| f64::from_bits(input.long())),
     }
 }
 
@@ -167,7 +216,7 @@ struct Collisions {
 
 impl Collisions {
     fn any(input: &mut Input<'_>, count: usize, bodies: usize) -> Self {
-        let mut elements = Column::any(input, count, |input, _| {
+        let mut elements = Column::any(input, count, 4, |input, _| {
             let mut words = [0; size_of::<Collision>() / 4];
             words[1] = if input.one_in(100) {
                 input.word()
@@ -178,7 +227,7 @@ impl Collisions {
             words[5] = if input.one_in(100) { input.word() } else { input.below(4) };
             words
         });
-        let mut impulses = Column::any(input, count, |_, _| [0; size_of::<Impulses>() / 4]);
+        let mut impulses = Column::any(input, count, 4, |_, _| [0; size_of::<Impulses>() / 4]);
         let by_place = input.one_in(4);
         let places: Vec<Place> = (0..count).map(|_| place(input)).collect();
         let nothing = StridedConst { data: ptr::null(), stride: 0 };
@@ -236,13 +285,8 @@ pub(super) fn run(bytes: &[u8]) -> Tally {
     // write.
     let opened = unsafe { zpgs_open(c"emulated".as_ptr(), &raw mut handle) };
     assert_eq!(opened, Status::Ok);
-    let shapes = [
-        Shape { inverse_mass: 0.0, inverse_inertia: [0.0; 3] },
-        Shape { inverse_mass: 1.0, inverse_inertia: [2.0; 3] },
-    ];
-    // SAFETY: the handle is open; `shapes` has `shapes.len()` shapes, and lives through the call,
-    // which only reads them.
-    let loaded = unsafe { zpgs_set_shapes(handle, shapes.as_ptr(), shapes.len()) };
+    // SAFETY: the handle is open; `SHAPES` has `SHAPES.len()` shapes, which the call only reads.
+    let loaded = unsafe { zpgs_set_shapes(handle, SHAPES.as_ptr(), SHAPES.len()) };
     assert_eq!(loaded, Status::Ok);
     let mut tally = Tally::default();
     for _ in 0..CALLS_MAX {

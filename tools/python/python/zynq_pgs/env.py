@@ -36,6 +36,8 @@ class PushBalls(VectorEnv):
     """
 
     def __init__(self, num_envs: int = 64, balls: int = 6, board: str = "auto") -> None:
+        if not 2 <= balls <= 16:
+            raise ValueError(f"found {balls} balls: give 2 to 16, one for each place of the grid")
         self.num_envs, self.balls = num_envs, balls
         self.board = Accelerator(board)
         self.board.set_shapes([(0, 0, 0, 0), (1, *[2.5 / RADIUS**2] * 3)])
@@ -55,10 +57,13 @@ class PushBalls(VectorEnv):
             self.observation_space = batch_space(self.single_observation_space, num_envs)
             self.action_space = batch_space(self.single_action_space, num_envs)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Begins every world anew; the world of index k has the seed `seed + k`."""
+    def reset(self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None):
+        """Begins every world anew; the world of index k has the seed `seed + k`, or `seed[k]` of a list."""
         if seed is not None:
-            self._random = [np.random.default_rng(seed + world) for world in range(self.num_envs)]
+            seeds = [seed + world for world in range(self.num_envs)] if np.ndim(seed) == 0 else seed
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"found {len(seeds)} seeds for {self.num_envs} worlds")
+            self._random = [np.random.default_rng(one) for one in seeds]
         self._begin(np.arange(self.num_envs))
         return self._observe(), {}
 
@@ -82,7 +87,9 @@ class PushBalls(VectorEnv):
 
     def close(self, **_: Any) -> None:
         """Closes the board."""
-        self.board.close()
+        board = getattr(self, "board", None)  # None where no board was opened.
+        if board is not None:
+            board.close()
 
     def _begin(self, worlds):
         """Puts the balls of some worlds on places of a grid of their own, at rest."""
