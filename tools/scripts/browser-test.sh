@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Opens the pages that pgs writes in a headless Chromium, uses them, and measures pictures a second. A page that
+# Opens the pages that pgs writes in a headless Chromium, uses them, and measures frames a second. A page that
 # reports an error, stays uniform, ignores a control or asks the network for something fails it.
 #
 # usage: browser-test.sh                     a run while it steps, two small scenes, and the quick report

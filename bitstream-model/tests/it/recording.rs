@@ -1,4 +1,4 @@
-//! A recording tells the course of a step to the clock, and changes nothing of it.
+//! A recording tells a step to the clock, and changes nothing of it.
 
 use bitstream_model::recording::{
     ChannelRecording, PacketSpan, Port, PortState, Recording, Span, Stage,

@@ -8,7 +8,7 @@ const { pathToFileURL } = require("node:url");
 const { chromium } = require("playwright-core");
 const checks = require("./pages.js");
 
-const SECONDS = 5; // Length of a measurement of pictures a second.
+const SECONDS = 5; // Length of a measurement of frames a second.
 
 const FLAGS = [
 	"--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -39,7 +39,7 @@ async function test(context, kind, file, folder) {
 				width: window.player.canvas.width, height: window.player.canvas.height, row: window.player.resolution,
 			}));
 			const rate = 1000 * (end[0] - begin[0]) / (end[1] - begin[1]);
-			console.log(`${name}: ${rate.toFixed(1)} pictures a second ${what}, ${width} x ${height} pixels (${Math.round(100 * row)} % of the rows)`);
+			console.log(`${name}: ${rate.toFixed(1)} frames a second ${what}, ${width} x ${height} pixels (${Math.round(100 * row)} % of the rows)`);
 			return rate;
 		},
 		async screenshot(part) {

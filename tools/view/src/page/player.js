@@ -138,7 +138,7 @@ class Player {
 		element("time").value = `${this.time.toFixed(2)} of ${this.end.toFixed(2)} s`;
 	}
 
-	// Measures pictures a second, and adapts the number of pixels to them.
+	// Measures frames a second, and adapts the number of pixels to them.
 	measure(now) {
 		if (!this.measured) {
 			this.measured = { since: now, pictures: this.pictures };
