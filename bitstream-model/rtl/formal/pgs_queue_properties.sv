@@ -3,8 +3,8 @@
 //
 // A model stands beside the queue. It knows collisions by their number in the stream, and for each body the slots until
 // it is free: no places, no records that move, no times modulo 256. Bodies, passes, the times of beats, and the room
-// for impulses are the solver's choice. The last part says what each register of the queue has in terms of the model:
-// with it, a cycle that keeps all properties follows from one that does.
+// for impulses are the solver's choice. The last part gives the value of each register of the queue in terms of the
+// model: with it, a cycle that keeps all properties follows from one that does.
 `default_nettype none
 
 module pgs_queue_properties #(
@@ -340,7 +340,7 @@ module pgs_queue_properties #(
     assert (has_slot == (taken - entered != COMING));
   end
 
-  // ---- The invariant: what each register of the queue has, in terms of the model
+  // ---- The invariant: the value of each register of the queue, in terms of the model
 
   localparam integer WIDTH = SLOT + 2*BODY + 2;
   (* mem2reg *) reg [COLLISION-1:0] number_in [0:SLOTS];   // number of the collision in a place

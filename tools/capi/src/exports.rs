@@ -223,7 +223,8 @@ pub unsafe extern "C" fn zpgs_wait(
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
         let structure = [unsafe { span(bodies) }];
-        // SAFETY: as above.
+        // SAFETY: `bodies` is null or leads to its structure, whose arrays live through the call,
+        // which alone uses them.
         let mut bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.
@@ -402,17 +403,22 @@ pub(crate) unsafe fn read_input<'a>(
     parameters: *const Parameters,
 ) -> Result<(BodiesView<'a>, CollisionsView<'a>, StepParameters, [Span; 6]), Failure> {
     // SAFETY: each pointer is null or leads to its structure, whose arrays are as it describes:
-    // `# Safety` of this function. The same holds below.
+    // `# Safety` of this function.
     let first = unsafe { span(bodies) };
-    // SAFETY: as above.
+    // SAFETY: `collisions` is null or leads to its structure with the size in it: `# Safety` of
+    // this function.
     let second = unsafe { span(collisions) };
-    // SAFETY: as above.
+    // SAFETY: `parameters` is null or leads to its structure with the size in it: `# Safety` of
+    // this function.
     let third = unsafe { span(parameters) };
-    // SAFETY: as above.
+    // SAFETY: `bodies` is null or leads to its structure, whose arrays are as it describes: `#
+    // Safety` of this function.
     let bodies = unsafe { read_bodies(bodies) }?;
-    // SAFETY: as above.
+    // SAFETY: `collisions` is null or leads to its structure, whose arrays are as it describes: `#
+    // Safety` of this function.
     let collisions = unsafe { read_collisions(collisions) }?;
-    // SAFETY: as above.
+    // SAFETY: `parameters` is null or leads to its structure with the size in it: `# Safety` of
+    // this function.
     let parameters = unsafe { read_parameters(parameters) }?;
     check_impulses(&collisions, &parameters)?;
     let [all, impulses, places] = collisions.inputs();

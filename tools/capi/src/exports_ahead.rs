@@ -50,14 +50,15 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
     started: *mut Status,
 ) -> Status {
     // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this call
-    // returns: `# Safety` of this function. The same holds below.
+    // returns: `# Safety` of this function.
     let handle = unsafe { memory::handle(accelerator) };
     let mut start_failed = None;
     let status = call_with(handle, |state| {
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
         let structure = [unsafe { span(bodies) }];
-        // SAFETY: as above.
+        // SAFETY: `bodies` is null or leads to its structure, whose arrays live through the call,
+        // which alone uses them.
         let bodies = unsafe { read_bodies(bodies) };
         // SAFETY: `report` is null or leads to a structure of the size in it, which this call alone
         // uses.
@@ -72,14 +73,16 @@ pub unsafe extern "C" fn zpgs_wait_and_start(
         let (done, start) = state.wait_and_start(&mut bodies)?;
         let status = start.as_ref().err().map_or(Status::Ok, |failure| failure.status);
         start_failed = start.err();
-        // SAFETY: as above.
+        // SAFETY: `started` is null or leads to a status that this call alone uses: `# Safety` of
+        // this function.
         unsafe { memory::store(started, "status of the start", status) }?;
         let done = done?;
         report.into_iter().for_each(|report| report.write(Report::from(&done)));
         Ok(())
     });
     if let (Status::Ok, Some(failure)) = (status, start_failed) {
-        // SAFETY: as above.
+        // SAFETY: `accelerator` is null or from `zpgs_open`, and closed by no thread before this
+        // call returns.
         if let Ok(handle) = unsafe { memory::handle(accelerator) } {
             handle.note(failure);
         }

@@ -85,7 +85,8 @@ pub unsafe extern "C" fn zpgs_end(
         // SAFETY: `bodies` is null or leads to its structure; the arrays in it live through the
         // call, and this call alone uses them.
         let structures = [unsafe { span(bodies) }];
-        // SAFETY: as above.
+        // SAFETY: `bodies` is null or leads to its structure, whose arrays live through the call,
+        // which alone uses them.
         let bodies = unsafe { read_bodies(bodies) }?;
         // SAFETY: `parameters` is null or leads to a structure of the size in it.
         let parameters = unsafe { read_parameters(parameters) }?;

@@ -114,7 +114,8 @@ impl Handle {
     pub(crate) fn submit(&self, call: &Call, second: bool) -> Result<(), Failure> {
         let (Call { bodies, parameters, .. }, collisions) = (call, call.collisions());
         let start = if second { zpgs_prepare } else { zpgs_submit };
-        // SAFETY: as in `step`.
+        // SAFETY: open as long as `self`; the structures have their sizes, and their arrays are
+        // alive and in no other use (the invariant).
         self.check(unsafe { start(self.0.as_ptr(), bodies, collisions, parameters) })
     }
 
@@ -128,9 +129,11 @@ impl Handle {
             (self.0.as_ptr(), &raw const call.bodies, empty_report());
         let (mut started, report_at) = (Status::Ok, &raw mut report);
         let done = match second {
-            // SAFETY: as in `step`; the status is this function's own.
+            // SAFETY: open as long as `self`; the arrays are alive and in no other use (the
+            // invariant); report and status are this function's own.
             true => unsafe { zpgs_wait_and_start(handle, bodies, report_at, &raw mut started) },
-            // SAFETY: as in `step`.
+            // SAFETY: open as long as `self`; the arrays are alive and in no other use (the
+            // invariant); the report is this function's own.
             false => unsafe { zpgs_wait(handle, bodies, report_at) },
         };
         let done = self.check(done).map(|()| report);

@@ -64,7 +64,7 @@ def test_each_pair_has_its_own_friction(client):
     assert np.allclose(3 - speed[:, 1], np.array(frictions) * 9.81 * 0.2, rtol=0.1)
 
 
-def test_a_centre_of_mass_off_the_frame_and_forces_are_those_of_mujoco(client):
+def test_a_centre_of_mass_off_the_frame_and_forces_equal_mujoco(client):
     heavy = '<geom type="sphere" size="0.1" pos="0.4 0.1 0" mass="5"/>'
     model = world(box(0, 3, more=heavy))
     own, board = mujoco.MjData(model), mujoco.MjData(model)

@@ -116,10 +116,9 @@ impl<const N: usize> Numbers<N> {
     ) -> Result<Self, Failure> {
         let array = array.into();
         match size {
-            // SAFETY: the caller promises the array; floats take every bit pattern. The same holds
-            // below.
+            // SAFETY: the caller promises the array; floats take every bit pattern.
             0 | 4 => Ok(Self::Single(unsafe { Column::new(array, count, name) }?)),
-            // SAFETY: as above.
+            // SAFETY: the caller promises the array; doubles take every bit pattern.
             8 => Ok(Self::Double(unsafe { Column::new(array, count, name) }?)),
             _ => Err(Failure::argument(format!(
                 "found {size} as the number_size of zpgs_bodies: give 4 for float or 8 for double"
@@ -142,11 +141,12 @@ impl<const N: usize> Numbers<N> {
     pub(super) unsafe fn get(&self, index: usize, origin: [f64; N]) -> [f32; N] {
         match self {
             Self::Single(column) => {
-                // SAFETY: the caller promises the index and that nothing writes. The same holds
-                // below.
+                // SAFETY: the caller promises that the index is below the count and that nothing
+                // writes.
                 Real::relative(unsafe { column.get(index) }, origin.map(Real::single))
             }
-            // SAFETY: as above.
+            // SAFETY: the caller promises that the index is below the count and that nothing
+            // writes.
             Self::Double(column) => Real::relative(unsafe { column.get(index) }, origin),
         }
     }
@@ -158,18 +158,21 @@ impl<const N: usize> Numbers<N> {
     pub(super) unsafe fn set(&mut self, index: usize, results: [f32; N], origin: [f64; N]) {
         match self {
             Self::Single(column) => {
-                // SAFETY: the caller promises the index and that nothing else uses the element. The
-                // same holds below.
+                // SAFETY: the caller promises that the index is below the count and that nothing else
+                // uses the element.
                 let mut kept = unsafe { column.get(index) };
                 Real::store(&mut kept, results, origin.map(Real::single));
-                // SAFETY: as above.
+                // SAFETY: the caller promises that the index is below the count and that nothing
+                // else uses the element.
                 unsafe { column.set(index, kept) };
             }
             Self::Double(column) => {
-                // SAFETY: as above.
+                // SAFETY: the caller promises that the index is below the count and that nothing
+                // else uses the element.
                 let mut kept = unsafe { column.get(index) };
                 Real::store(&mut kept, results, origin);
-                // SAFETY: as above.
+                // SAFETY: the caller promises that the index is below the count and that nothing
+                // else uses the element.
                 unsafe { column.set(index, kept) };
             }
         }

@@ -82,7 +82,7 @@ unsafe fn size_in<T: Growing>(pointer: NonNull<T>) -> Result<usize, Failure> {
     check_size::<T>(size).map(|()| size)
 }
 
-/// The bytes of a structure, as many as the caller's has; none for null.
+/// The bytes of a structure: its first field has their number. No bytes for null.
 ///
 /// # Safety
 /// As [`read`].

@@ -35,22 +35,23 @@ impl BodiesView<'_> {
             arrays;
         let BodyArrays { positions, orientations, linear_velocities, angular_velocities, .. } =
             arrays;
-        // SAFETY: the caller promises each array, here and below; floats and integers take every
-        // bit pattern.
+        // SAFETY: the caller promises the array of positions; floats take every bit pattern.
         let positions = unsafe { Numbers::new(positions, count, size, "positions") }?;
-        // SAFETY: as above.
+        // SAFETY: the caller promises the array of orientations; floats take every bit pattern.
         let orientations = unsafe { Numbers::new(orientations, count, size, "orientations") }?;
-        // SAFETY: as above.
+        // SAFETY: the caller promises the array of linear velocities; floats take every bit
+        // pattern.
         let linear_velocities =
             unsafe { Numbers::new(linear_velocities, count, size, "linear velocities") }?;
-        // SAFETY: as above.
+        // SAFETY: the caller promises the array of angular velocities; floats take every bit
+        // pattern.
         let angular_velocities =
             unsafe { Numbers::new(angular_velocities, count, size, "angular velocities") }?;
-        // SAFETY: as above.
+        // SAFETY: the caller promises the array of shapes; integers take every bit pattern.
         let shapes = unsafe { Column::new(shapes, count, "shapes of the bodies") }?;
         let table = match table_count {
             0 => None,
-            // SAFETY: as above; every bit pattern is a shape.
+            // SAFETY: the caller promises `table_count` shapes; a shape takes every bit pattern.
             _ => Some(unsafe { slice(table, table_count, "shapes of the world") }?),
         };
         Ok(Self {
@@ -101,15 +102,15 @@ impl Bodies for BodiesView<'_> {
 
     fn body(&self, index: usize) -> Body {
         self.check(index);
-        // SAFETY: the index is below the count, and a shared view has no writer; both hold below.
+        // SAFETY: the index is below the count, and a shared view has no writer.
         let position = unsafe { self.positions.get(index, self.origin) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a shared view has no writer.
         let orientation = unsafe { self.orientations.get(index, [0.0; 4]) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a shared view has no writer.
         let linear = unsafe { self.linear_velocities.get(index, [0.0; 3]) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a shared view has no writer.
         let angular = unsafe { self.angular_velocities.get(index, [0.0; 3]) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a shared view has no writer.
         let shape = unsafe { self.shapes.get(index) };
         let pose = Pose { position, orientation };
         Body { pose, velocity: Velocity { linear, angular }, shape }
@@ -117,14 +118,16 @@ impl Bodies for BodiesView<'_> {
 
     fn commit(&mut self, index: usize, pose: Pose, velocity: Velocity) {
         self.check(index);
-        // SAFETY: the index is below the count, and the view is borrowed by this call alone; both
-        // hold below.
+        // SAFETY: the index is below the count, and this call alone has the view.
         unsafe { self.positions.set(index, pose.position, self.origin) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a view that is borrowed for writing
+        // is the only one.
         unsafe { self.orientations.set(index, pose.orientation, [0.0; 4]) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a view that is borrowed for writing
+        // is the only one.
         unsafe { self.linear_velocities.set(index, velocity.linear, [0.0; 3]) };
-        // SAFETY: as above.
+        // SAFETY: the index is below the count (`check`), and a view that is borrowed for writing
+        // is the only one.
         unsafe { self.angular_velocities.set(index, velocity.angular, [0.0; 3]) };
     }
 }

@@ -22,7 +22,7 @@ pub const SCHEMA: u32 = 1;
 pub const GOOD: Style = AnsiColor::Green.on_default();
 /// The colour of a failure.
 pub const BAD: Style = AnsiColor::Red.on_default().bold();
-/// The colour of what was refused or left out.
+/// The colour of a refusal, and of a check that was left out.
 pub const REFUSED: Style = AnsiColor::Yellow.on_default();
 
 /// A time in milliseconds.

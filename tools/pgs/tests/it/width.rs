@@ -108,7 +108,7 @@ fn no_line_of_output_is_broken_within_a_word() {
 
 /// The colours of a verdict: on a terminal, or where they are asked for.
 #[test]
-fn colours_are_those_of_a_terminal_unless_it_is_said_otherwise() {
+fn a_terminal_gets_colours_unless_an_option_or_a_variable_forbids() {
     let shown = |arguments: &str, variables: &[(&str, &str)]| {
         let mut pgs = pgs();
         pgs.env_remove("NO_COLOR").envs(variables.iter().copied());

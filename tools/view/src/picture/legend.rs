@@ -70,7 +70,7 @@ impl Canvas<'_> {
         self.pixels[..rows].iter_mut().for_each(|pixel| *pixel = mixed(PANEL, *pixel, [255.0; 3]));
     }
 
-    /// Draws what the colours of these kinds stand for, and the distance of the ground's lines, m.
+    /// Draws the meaning of the colours of these kinds, and the distance of the ground's lines, m.
     pub(super) fn legend(&mut self, kinds: &[Geometry], spacing: f32) {
         self.panel();
         let mut left = GAP;

@@ -26,7 +26,7 @@ Examples:
 A UIO node is recognised by its regions, independently of its name; its line shows the option that
 uses it.";
 
-/// List the boards of this system, and what keeps one from use
+/// List the boards of this system, with the reason where one is unusable
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ListArgs {

@@ -22,7 +22,8 @@ fn summary<'a>(opened: &OpenBoard, scene: &mut Scene, course: &'a Course) -> Opt
     Some(Summary::new(&course.totals, is_emulated(opened), (scene, last)))
 }
 
-/// Prints the end of the run, for people: five lines, behind what went wrong.
+/// Prints the end of the run for people: an interruption and planned faults if there are any, then
+/// five lines.
 pub(super) fn print_end(
     args: &RunArgs,
     opened: &OpenBoard,

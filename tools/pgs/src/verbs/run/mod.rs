@@ -371,7 +371,7 @@ fn take_steps(
     Ok(())
 }
 
-/// The columns of the default table, as many as fit the terminal.
+/// The columns of the default table that fit the terminal.
 fn all_columns(opened: &OpenBoard, beside_cold: bool) -> Vec<Fixed> {
     let (own, mut used) = (columns(is_emulated(opened)), 0);
     let all = own.into_iter().chain(beside::COLUMNS.into_iter().filter(|_| beside_cold));
